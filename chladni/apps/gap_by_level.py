@@ -7,7 +7,8 @@ import numpy as np
 
 from chladni.apps.gap_comparison import GapComparison, comparison_document
 from chladni.apps.gap_document import Document
-from chladni.gap.comparison.levels import LEAST_RATIO, compare_levels
+from chladni.gap.calibration import ALIKE
+from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.errors import EstimateError
@@ -69,7 +70,7 @@ def _growth(comparisons: Sequence[GapComparison]) -> tuple[str, ...]:
     name = max(shared, key=lambda one: _level(comparisons[0], one))
     low, *_, high = sorted(comparisons, key=lambda one: _level(one, name))
     low_level, high_level = (_level(one, name) for one in (low, high))
-    if high_level < LEAST_RATIO * low_level:
+    if high_level < ALIKE * low_level:
         return ()
     first, last = (f"{percent(one.gap)} (noise {percent(one.noise)})" for one in (low, high))
     return (f"the gap is {first} at {low_level:.3g} RMS of {name}, {last} at {high_level:.3g}",)

@@ -3,10 +3,10 @@
 import ctypes
 import platform
 
-#: Options of glibc's mallopt (malloc.h), and what they are set to: the largest that it takes, and as much as is spare
-#: beside a diagnosis that needs half of it.
+from chladni.gap.calibration import SPARE_BYTES
+
+#: Options of glibc's mallopt (malloc.h); the second takes an eighth of what is spare at most.
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
-_SPARE, _LARGEST = 256 << 20, 32 << 20
 
 
 def keep_memory() -> bool:
@@ -23,5 +23,5 @@ def keep_memory() -> bool:
     if platform.libc_ver()[0] != "glibc":
         return False
     library = ctypes.CDLL(None)
-    options = ((_MMAP_THRESHOLD, _LARGEST), (_TRIM_THRESHOLD, _SPARE))
+    options = ((_MMAP_THRESHOLD, SPARE_BYTES // 8), (_TRIM_THRESHOLD, SPARE_BYTES))
     return all(library.mallopt(option, value) == 1 for option, value in options)

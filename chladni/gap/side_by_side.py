@@ -9,11 +9,11 @@ from itertools import count
 from threading import Event, Thread
 from typing import Generic, TypeVar
 
+from chladni.gap.calibration import THREADS
+
 PieceT = TypeVar("PieceT")
 DoneT = TypeVar("DoneT")
 
-#: Threads at most: each fit holds arrays as long as the log, and what isn't machine code runs one at a time anyway.
-_MOST = 4
 _IS_PIECE: ContextVar[bool] = ContextVar("is_piece", default=False)
 
 
@@ -24,7 +24,7 @@ def threads() -> int:
     """
     if multiprocessing.parent_process() is not None:
         return 1
-    return min(os.cpu_count() or 1, _MOST)
+    return min(os.cpu_count() or 1, THREADS)
 
 
 def side_by_side(

@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from chladni.gap.diagnosis.belief import LAPSE, TEMPER, Belief
+from chladni.gap.calibration import LAPSE, TEMPER
+from chladni.gap.diagnosis.belief import Belief
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.explanation.evidence import Left
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis

@@ -4,16 +4,9 @@ import numpy as np
 from scipy import fft
 from scipy.linalg import solve_toeplitz
 
+from chladni.gap.calibration import AR_ORDER, GRANTED, ROUNDING, ZERO
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Mask, Real
-
-HIGHEST_ORDER = 12
-# Share of the power added to lag 0: keeps the equations solvable where a spectrum has (next to) empty bands.
-LOADING = 1e-8
-# Outputs without any scatter (noise-free simulations) get this share of their signal's RMS, so that whitening works.
-SMALLEST = 1e-9
-# Of signals that are zero altogether.
-TINY = 1e-100
 
 
 def noise_floor_of(
@@ -45,8 +38,8 @@ def noise_floor_of(
     scale
         ``[output]`` RMS of the signal; a floor below 1e-9 of it is lifted there.
     """
-    lags = fft.irfft(spectrum, axis=1)[:, : HIGHEST_ORDER + 1]
-    lags[:, 0] = np.maximum(lags[:, 0], np.maximum(SMALLEST * scale, TINY) ** 2)
+    lags = fft.irfft(spectrum, axis=1)[:, : AR_ORDER + 1]
+    lags[:, 0] = np.maximum(lags[:, 0], np.maximum(ROUNDING * scale, ZERO) ** 2)
     fitted = [_lowest_aic(row, samples) for row in lags]
     whitening = np.zeros((len(lags), max(row.size for row, _ in fitted)))
     for place, (row, _) in enumerate(fitted):
@@ -65,7 +58,7 @@ def noise_floor_of(
 def _lowest_aic(covariance: Real, samples: int) -> tuple[Real, float]:
     """Give the whitening filter, and the innovation variance, of the order that Akaike's criterion chooses."""
     loaded = covariance.copy()
-    loaded[0] *= 1 + LOADING
+    loaded[0] *= 1 + GRANTED
     models = [_yule_walker(loaded, order) for order in range(covariance.size)]
     variances = np.array([variance for _, variance in models])
     criterion = samples * np.log(variances) + 2 * np.arange(covariance.size)
@@ -78,4 +71,4 @@ def _yule_walker(covariance: Real, order: int) -> tuple[Real, float]:
     past = solve_toeplitz(covariance[:order], covariance[1 : order + 1])
     variance = float(covariance[0] - past @ covariance[1 : order + 1])
     # Rounding alone can bring it to zero or below.
-    return np.concatenate([[1.0], -past]), max(variance, LOADING * float(covariance[0]))
+    return np.concatenate([[1.0], -past]), max(variance, GRANTED * float(covariance[0]))

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
+from chladni.gap.calibration import BLOCK, FEWEST, LINES_A_TERM, LOCAL_TERMS
 from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
-from chladni.gap.comparison.local_rational import POLES, TERMS, output_error
+from chladni.gap.comparison.local_rational import POLES, output_error
 from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.diagnosis import DistortionShare
 from chladni.gap.records.measurement import Measurement
@@ -14,13 +15,6 @@ from chladni.signals.arrays import Complex, Index, Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value
 from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
-
-# Fewer detection lines within the excited band scatter too much to speak for the excited ones.
-FEWEST_DETECTION = 4
-# Detection lines next to an excited line that its distortion is read from.
-NEIGHBOURS = 8
-# Excited lines in a block of a smooth fit, over its unknowns.
-LINES_A_TERM = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -166,9 +160,9 @@ def _detected(repeated: Real, excited: Mask, *, step: int) -> float | None:
     # Outside of the band the machine answers differently; those lines say nothing of the excited ones.
     inside = np.arange(lines[0], lines[-1] + 1, step)
     detection = inside[~excited[inside]]
-    if detection.size < FEWEST_DETECTION:
+    if detection.size < FEWEST:
         return None
-    near = min(NEIGHBOURS, detection.size)
+    near = min(BLOCK, detection.size)
     first = np.clip(np.searchsorted(detection, lines) - near // 2, 0, detection.size - near)
     sums = np.concatenate([[0.0], np.cumsum(repeated[detection])])
     return float(np.sum(sums[first + near] - sums[first]) / near)
@@ -176,7 +170,7 @@ def _detected(repeated: Real, excited: Mask, *, step: int) -> float | None:
 
 def _roughness(u: Complex, y: Complex, noise: Real, line: Index) -> float | None:
     """Power by which the response to neighbouring excited lines scatters about a smooth one; None with few lines."""
-    size = LINES_A_TERM * (TERMS + POLES)
+    size = LINES_A_TERM * (LOCAL_TERMS + POLES)
     blocks = u.size // size
     if blocks < 1:
         return None
@@ -187,7 +181,7 @@ def _roughness(u: Complex, y: Complex, noise: Real, line: Index) -> float | None
     # Odd lines and combs aren't neighbours; the polynomials go over their true places.
     centre, half = (places[:, -1:] + places[:, :1]) / 2, (places[:, -1:] - places[:, :1]) / 2
     left = output_error(u[index][:, :, None], y[index], (places - centre) / half)
-    power = np.mean(np.abs(left) ** 2) * size / (size - TERMS - POLES) - noise.mean()
+    power = np.mean(np.abs(left) ** 2) * size / (size - LOCAL_TERMS - POLES) - noise.mean()
     return float(power * u.size)
 
 

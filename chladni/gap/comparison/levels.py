@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import ALIKE, CLEARLY, LITTLE, NOTICED, OUTSIDE, SLIGHT
 from chladni.gap.comparison.distortion import distortion_of
 from chladni.gap.comparison.linear_approximation import best_linear_approximation, moving_inputs
 from chladni.gap.comparison.local_rational import local_fit
@@ -13,18 +14,6 @@ from chladni.gap.records.measurement import Measurement
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.spectral.peaks import find_response_peaks
-
-# Levels nearer than this ratio aren't different levels.
-LEAST_RATIO = 1.1
-# A resonance moves by less than this from one level to the next, or it's another one.
-FARTHEST = 0.08
-# Changes are told from this many standard deviations on, and from these sizes.
-LEAST_SIGMAS = 3.0
-LEAST_SHIFT = 1e-3
-LEAST_HEIGHT = 0.03
-# The share that isn't linear is told to grow when it does so by this factor and to this share of the RMS.
-LEAST_GROWTH = 1.5
-LEAST_NONLINEAR = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,8 +81,8 @@ def compare_levels(measurements: Sequence[Measurement]) -> tuple[str, ...]:
     levels = level_responses(measurements)
     if len(levels) < 2:
         return ()
-    if levels[-1].level < LEAST_RATIO * levels[0].level:
-        return (f"the levels differ by less than {LEAST_RATIO - 1:.0%}: they tell nothing about nonlinearity",)
+    if levels[-1].level < ALIKE * levels[0].level:
+        return (f"the levels differ by less than {ALIKE - 1:.0%}: they tell nothing about nonlinearity",)
     outputs = [channel.name for channel in levels[0].response.responses]
     # A sensor that one log lacks can't be compared.
     told = [_of_output(output, levels) for output in outputs if _everywhere(output, levels)]
@@ -122,7 +111,7 @@ def _of_output(output: str, levels: Sequence[LevelResponse]) -> list[str]:
     if peaks is not None:
         sentences.append(f"{output}: {_resonance(peaks[0], peaks[-1])} {span}")
     first, last = (_nonlinear_of(output, one) for one in (levels[0], levels[-1]))
-    if last > LEAST_GROWTH * first and last > LEAST_NONLINEAR:
+    if last > CLEARLY * first and last > NOTICED:
         sentences.append(
             f"{output}: what no linear system gives grows from {first:.2g} to {last:.2g} of its RMS {span}"
         )
@@ -132,7 +121,7 @@ def _of_output(output: str, levels: Sequence[LevelResponse]) -> list[str]:
 def followed_peak(output: str, levels: Sequence[LevelResponse]) -> tuple[Peak, ...] | None:
     """Give the strongest resonance of the lowest level at every level; None where it's lost on the way.
 
-    Between one level and the next it moves by at most 8 %.
+    Between one level and the next it moves by at most a tenth.
     """
     followed: list[Peak] = []
     # Level by level: over the whole range a resonance may move past where its neighbour was.
@@ -141,7 +130,7 @@ def followed_peak(output: str, levels: Sequence[LevelResponse]) -> tuple[Peak, .
         peaks = [peak for peak in find_response_peaks(rows) if peak.channels[1] == rows.references[0].name]
         if followed:
             before = followed[-1].frequency_hz
-            peaks = [peak for peak in peaks if abs(peak.frequency_hz - before) <= FARTHEST * before]
+            peaks = [peak for peak in peaks if abs(peak.frequency_hz - before) <= LITTLE * before]
         if not peaks:
             return None
         followed.append(max(peaks, key=lambda peak: peak.height))
@@ -152,8 +141,8 @@ def _resonance(first: Peak, last: Peak) -> str:
     shift_std = float(np.hypot(first.frequency_std_hz, last.frequency_std_hz))
     height_std = float(np.hypot(first.height_std, last.height_std))
     shift, growth = last.frequency_hz - first.frequency_hz, last.height - first.height
-    moves = abs(shift) > max(LEAST_SIGMAS * shift_std, LEAST_SHIFT * first.frequency_hz)
-    swells = abs(growth) > max(LEAST_SIGMAS * height_std, LEAST_HEIGHT * first.height)
+    moves = abs(shift) > max(OUTSIDE * shift_std, SLIGHT * first.frequency_hz)
+    swells = abs(growth) > max(OUTSIDE * height_std, NOTICED * first.height)
     if not moves and not swells:
         return f"its resonance at {first.frequency_hz:.4g} Hz stays as it is"
     parts = []

@@ -13,9 +13,6 @@ from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.frequency_response import frequency_response
 from chladni.spectral.periodic import Period, periodic_cross_spectra
 
-# One period has no scatter.
-FEWEST_PERIODS = 2
-
 
 def best_linear_approximation(measurement: Measurement) -> FrequencyResponse:
     """Estimate the best linear approximation of every output to every input that moves.
@@ -43,7 +40,8 @@ def period_spectra(measurement: Measurement) -> CrossSpectra | None:
     if samples is None or not names:
         return None
     count = measurement.samples // samples - measurement.transient_periods
-    if count < FEWEST_PERIODS:
+    # One period has no scatter.
+    if count < 2:
         return None
     # The measurement knows its period already; it needn't be searched for in one channel again.
     found = Period(

@@ -3,16 +3,12 @@
 import numpy as np
 from scipy import fft
 
+from chladni.gap.calibration import LESS, LINES_A_TERM, LOCAL_TERMS, RIDGE
 from chladni.gap.comparison.residual_spectra import ResidualSpectra
 from chladni.signals.arrays import Complex, Real
 
-# Terms of each local polynomial: 1, r, r^2.
-TERMS = 3
-POLES = 2
-# Lines in a block over its unknowns. Few follow a light resonance, many leave more to see the noise by.
-LINES_A_TERM = 3
-# Poles are kept in a block where they lower the residual of an output, for its freedom, below this share.
-WORTH_POLES = 0.7
+#: D has the terms of a polynomial but for the one.
+POLES = LOCAL_TERMS - 1
 
 
 def local_fit(inputs: Real, outputs: Real) -> ResidualSpectra | None:
@@ -38,7 +34,7 @@ def local_fit(inputs: Real, outputs: Real) -> ResidualSpectra | None:
         None when the record has fewer lines than one block.
     """
     samples = outputs.shape[1]
-    unknowns = TERMS * (len(inputs) + 1)
+    unknowns = LOCAL_TERMS * (len(inputs) + 1)
     lines = LINES_A_TERM * (unknowns + POLES)
     # The line at 0 Hz is a matter of offsets, the last one has no imaginary part.
     blocks = ((samples - 1) // 2 - 1) // lines
@@ -58,7 +54,7 @@ def local_fit(inputs: Real, outputs: Real) -> ResidualSpectra | None:
     # Where little but noise answers, poles are fitted to noise. All outputs go together, so that what they share
     # stays shared.
     power = np.sum(np.abs(plain) ** 2, axis=1), np.sum(np.abs(shaped) ** 2, axis=1)
-    with_poles = np.any(power[1] / (free - POLES) < WORTH_POLES * power[0] / free, axis=1)
+    with_poles = np.any(power[1] / (free - POLES) < LESS * power[0] / free, axis=1)
     freedom = np.where(with_poles[:, None], free - POLES, free) * np.ones((1, len(outputs)))
     residual = np.where(with_poles[:, None, None], shaped, plain).astype(np.complex128)
     return ResidualSpectra(
@@ -89,7 +85,7 @@ def output_error(signals: Complex, y: Complex, r: Real) -> Complex:
 
 def _regressors(signals: Complex, r: Real) -> Complex:
     """``[block, line, term]``: each signal times 1, r, r^2."""
-    terms = signals[:, :, :, None] * _powers(r, 0, TERMS)[..., None, :]
+    terms = signals[:, :, :, None] * _powers(r, 0, LOCAL_TERMS)[..., None, :]
     return np.asarray(terms.reshape(*signals.shape[:2], -1))
 
 
@@ -107,6 +103,6 @@ def unreached(regressors: Complex, targets: Complex) -> Complex:
 def _solved(regressors: Complex, targets: Complex) -> Complex:
     q, r = np.linalg.qr(regressors)
     # An output that is exactly zero has nothing to fit poles to.
-    tiny = 1e-12 * np.abs(r).max(axis=(1, 2), keepdims=True) + np.finfo(float).tiny
+    tiny = RIDGE * np.abs(r).max(axis=(1, 2), keepdims=True) + np.finfo(float).tiny
     loaded = r + tiny * np.eye(r.shape[-1])
     return np.asarray(np.linalg.solve(loaded, q.conj().transpose(0, 2, 1) @ targets))

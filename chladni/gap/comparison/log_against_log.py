@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.gap.calibration import NOTICED, UNNOTICED
 from chladni.gap.comparison.distortion import Distortion, distortion_where_told
 from chladni.gap.comparison.log_regimes import log_regimes
 from chladni.gap.comparison.noise_estimate import estimate_noise
@@ -17,11 +18,6 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Real
 from chladni.signals.errors import LogError
 from chladni.signals.value import Value
-
-# Rates of two clocks agree to this; beyond, samples drift apart.
-SAME_RATE = 1e-6
-# Inputs that differ by more than this share of their RMS didn't drive the same experiment.
-SAME_INPUT = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -161,7 +157,8 @@ def _cut(measurement: Measurement, names: Sequence[str], samples: int) -> Measur
 
 def _require_same_rate(measured: Measurement, simulated: Measurement) -> None:
     ours_hz, theirs_hz = measured.sample_rate_hz, simulated.sample_rate_hz
-    if abs(ours_hz - theirs_hz) > SAME_RATE * ours_hz:
+    # Beyond, samples drift apart.
+    if abs(ours_hz - theirs_hz) > UNNOTICED * ours_hz:
         raise LogError(
             f"{measured.log} has {ours_hz:g} Hz, {simulated.log} {theirs_hz:g} Hz; bring them to one rate, "
             f"chladni convert {simulated.log} OUT.mcap --resample {ours_hz:g}"
@@ -197,7 +194,7 @@ def _input_remarks(measured: Measurement, simulated: Measurement, samples: int) 
             theirs = simulated.inputs[simulated.input_names.index(name), :samples]
             size = float(np.sqrt(np.mean(ours**2)))
             off = float(np.sqrt(np.mean((ours - theirs) ** 2)))
-            if off > SAME_INPUT * size:
+            if off > NOTICED * size:
                 share = off / size if size > 0 else np.inf
                 remarks.append(
                     f"input {name!r} differs by {share:.2g} of its RMS between the logs: part of the gap is the "

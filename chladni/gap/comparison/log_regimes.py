@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import fft
 
+from chladni.gap.calibration import CYCLES
 from chladni.gap.comparison.amplitude import amplitude
 from chladni.gap.comparison.shares import regime_shares
 from chladni.gap.records.diagnosis import RegimeShare
@@ -15,8 +16,6 @@ from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Real
 
 MOTION_UNITS = frozenset({"m", "rad", "m/s", "rad/s"})
-# Cycles of an output's mean frequency that its amplitude is taken over: fewer would follow the signal itself.
-CYCLES = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +48,7 @@ def log_regimes(residual: Real, measured: Measurement) -> tuple[RegimeShare, ...
 
 
 def cycles_of(signal: Real, sample_rate_hz: float) -> int:
-    """Give the samples of `CYCLES` cycles of a signal's mean frequency; all of one that stands still."""
+    """Give the samples of four cycles of a signal's mean frequency; all of one that stands still."""
     power = np.abs(fft.rfft(signal - signal.mean())) ** 2
     if not power.sum() > 0:
         return signal.size

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import CYCLES, LISTED, MOST, SAMPLES_A_CYCLE
 from chladni.gap.comparison.short_log import modes_of, shortness
 from chladni.gap.comparison.unstable_model import instability
 from chladni.gap.comparison.whole_stretch import Read, good_samples, whole_stretch
@@ -21,14 +22,6 @@ from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import si_factor
 from chladni.signals.visible import place_of
 from chladni.signals.wording import counted
-
-# With fewer of the lowest mode an answer is possible, but poor.
-FEW_CYCLES = 5.0
-# A channel with this share of its samples missing is no measurement: it's left out rather than the log refused.
-MOSTLY_MISSING = 0.5
-# Sampled more slowly than this many times a cycle, a mode can't be followed between the samples.
-SAMPLES_A_CYCLE = 2.5
-NAMES_TOLD = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,7 +112,7 @@ def matched_log(
     """
     compiled = model.compile()
     # What was read of a log may be a small part of it: the channel that was meant may be among the others.
-    told = some_of([one.name for one in recording.channels] if held is None else held, count=NAMES_TOLD)
+    told = some_of([one.name for one in recording.channels] if held is None else held, count=LISTED)
     inputs = [_matched(terminal, recording) for terminal in compiled.inputs]
     _require_inputs(inputs, model.name, log, held=told)
     driving = [match.row for match in inputs if match.row is not None]
@@ -206,7 +199,7 @@ def _why_unusable(match: _Match, recording: TimeSeries, log: str, driving: Seque
             f"{recording.channels[apart[0]].name!r} {_span(recording, apart[0])}: at no time both; take stamps of "
             "one clock (--stamp log), or record both together"
         )
-    if np.mean(good) < MOSTLY_MISSING:
+    if np.mean(good) < MOST:
         return f"channel {match.wanted!r} misses {np.mean(~good):.0%} of its samples"
     values = recording.values[match.row][good]
     if values.min() == values.max():
@@ -306,10 +299,10 @@ def _limits(compiled: CompiledModel, measurement: Measurement, *, short: bool) -
     duration_s, rate_hz = measurement.duration_s, measurement.sample_rate_hz
     modes_hz = modes_of(compiled)
     # Once: a log that is shorter still was told as such.
-    if modes_hz.size and duration_s * modes_hz.min() < FEW_CYCLES and not short:
+    if modes_hz.size and duration_s * modes_hz.min() < CYCLES and not short:
         remarks.append(
             f"the log is short: {duration_s:.3g} s hold {duration_s * modes_hz.min():.2g} cycles of the lowest mode "
-            f"({modes_hz.min():.3g} Hz), {FEW_CYCLES:g} or more tell more"
+            f"({modes_hz.min():.3g} Hz), {CYCLES:g} or more tell more"
         )
     if modes_hz.size and rate_hz < SAMPLES_A_CYCLE * modes_hz.max():
         beyond = int(np.sum(rate_hz < SAMPLES_A_CYCLE * modes_hz))

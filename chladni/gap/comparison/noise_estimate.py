@@ -5,8 +5,21 @@ from dataclasses import replace
 import numpy as np
 from scipy import fft
 
+from chladni.gap.calibration import (
+    CLEARLY,
+    FAR,
+    FEWEST_SAMPLES,
+    GRID,
+    HARDLY_ANY,
+    LINES_A_TERM,
+    LITTLE,
+    LOCAL_TERMS,
+    MOST,
+    SAME,
+    SOME,
+)
 from chladni.gap.comparison.autoregressive import noise_floor_of
-from chladni.gap.comparison.local_rational import local_fit
+from chladni.gap.comparison.local_rational import POLES, local_fit
 from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.comparison.residual_spectra import ResidualSpectra
 from chladni.gap.records.measurement import Measurement
@@ -14,29 +27,6 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError
 from chladni.spectral.windows import window_samples
-
-# Degrees of freedom wanted in a block of lines between periods; as many as a local fit has.
-BLOCK_FREEDOM = 24
-# Scatter about the mean period over scatter from one period to the next, of a machine that doesn't drift: 1.
-DRIFT_RATIO = 1.25
-# What the other outputs share of a residual must be more than this share of its RMS to be worth a word.
-SHARED = 0.1
-# A block is quiet where the response stands out of what is left by less than this in power.
-QUIET = 3.0
-LEAST_QUIET = 0.05
-# Scatter between periods is noise, unless a fit leaves less than this share of it: then something moved between them.
-MOVED = 0.85
-# Residuals in loud bands that exceed the quiet ones by this power ratio may hold distortion.
-LOUDER = 1.5
-# Steps whose rounding is this share of a floor's power, or this share of samples that repeat the one before: what a
-# sensor does to its signal is then in its floor.
-ROUNDING = 0.3
-REPEATING = 0.2
-# Top of the band that a log too short for anything else is judged by.
-TOP_QUARTER = 0.75
-RESIDUAL_SEGMENT = 512
-SHORTEST_SEGMENT = 16
-GRID = 1024
 
 
 def estimate_noise(measurement: Measurement) -> NoiseFloor:
@@ -70,7 +60,7 @@ def _of_periods_or_fit(measurement: Measurement) -> NoiseFloor:
     outputs = measurement.outputs
     floor = _floor(spectra, outputs, "periods", np.zeros(len(outputs), dtype=np.bool_))
     # A machine that changes, or is disturbed, between periods makes their scatter a poor bound.
-    return chosen_floor(fitted.rms < MOVED * floor.rms, floor, fitted)
+    return chosen_floor(fitted.rms < floor.rms / SAME, floor, fitted)
 
 
 def _stepped(outputs: Real, floor: NoiseFloor) -> Mask:
@@ -80,8 +70,8 @@ def _stepped(outputs: Real, floor: NoiseFloor) -> Mask:
         levels = np.unique(row)
         # Of samples that are all different, the distances say how many there are, not how coarse they are.
         few = 1 < levels.size < row.size / 2
-        rounded = few and float(np.median(np.diff(levels))) ** 2 / 12 > ROUNDING * rms**2
-        answers.append(rounded or float(np.mean(np.diff(row) == 0)) > REPEATING)
+        rounded = few and float(np.median(np.diff(levels))) ** 2 / 12 > MOST**2 * rms**2
+        answers.append(rounded or float(np.mean(np.diff(row) == 0)) > SOME)
     return np.array(answers)
 
 
@@ -105,7 +95,7 @@ def noise_of_residual(residual: Real, *, sample_rate_hz: float, method: str = "e
     if not sample_rate_hz > 0:
         raise EstimateError(f"sample_rate_hz {sample_rate_hz} must be positive")
     samples = residual.shape[1]
-    length = min(samples, max(SHORTEST_SEGMENT, min(RESIDUAL_SEGMENT, samples // 8)))
+    length = min(samples, max(FEWEST_SAMPLES // 2, min(GRID // 2, samples // 8)))
     window = window_samples("hann", length)
     hop = max(1, length // 2)
     segments = np.lib.stride_tricks.sliding_window_view(residual, length, axis=1)[:, ::hop]
@@ -167,11 +157,11 @@ def _between_periods(periods: Real) -> ResidualSpectra | None:
     count, samples = periods.shape[1:]
     about_mean = (periods - periods.mean(axis=1, keepdims=True)) * np.sqrt(count / (count - 1))
     steps = np.diff(periods, axis=1) / np.sqrt(2)
-    drifts = np.mean(about_mean**2) > DRIFT_RATIO**2 * np.mean(steps**2)
+    drifts = np.mean(about_mean**2) > SAME**2 * np.mean(steps**2)
     scatter = steps if drifts else about_mean
     # Neighbouring steps share a period: of n - 1 of them, two thirds count (von Neumann 1941).
     worth = (count - 1) * (2 / 3 if drifts and count > 2 else 1.0) / scatter.shape[1]
-    lines = max(1, int(np.ceil(BLOCK_FREEDOM / (worth * scatter.shape[1]))))
+    lines = max(1, int(np.ceil(LINES_A_TERM * (2 * LOCAL_TERMS + POLES) / (worth * scatter.shape[1]))))
     blocks = (samples - 1) // 2 // lines
     if blocks < 1:
         return None
@@ -187,7 +177,7 @@ def _between_periods(periods: Real) -> ResidualSpectra | None:
 
 def _floor(spectra: ResidualSpectra, outputs: Real, method: str, upper_bound: Mask) -> NoiseFloor:
     whole, own = spectra.densities(), spectra.incoherent_densities()
-    lower = own.mean(axis=1) < (1 - SHARED) ** 2 * whole.mean(axis=1)
+    lower = own.mean(axis=1) < (1 - LITTLE) ** 2 * whole.mean(axis=1)
     density = np.where(lower[:, None], own, whole)
     freedom = spectra.freedom.T - np.where(lower[:, None], len(outputs) - 1, 0)
     # Power in few blocks is known by the freedom of those only; each complex number counts twice.
@@ -213,12 +203,12 @@ def _responses(spectra: ResidualSpectra, outputs: Real) -> Real:
 def _louder_than_quiet(spectra: ResidualSpectra, outputs: Real) -> Mask:
     """Whether each residual is louder where the machine responds: then it may hold distortion."""
     left, own = spectra.densities(), spectra.incoherent_densities()
-    answers = _responses(spectra, outputs) >= QUIET * left
+    answers = _responses(spectra, outputs) >= FAR * left
     verdict = np.ones(len(outputs), dtype=np.bool_)
     for place, loud in enumerate(answers):
-        if LEAST_QUIET < np.mean(~loud) < 1:
+        if HARDLY_ANY < np.mean(~loud) < 1:
             loudness = float(min(left[place, loud].mean(), own[place, loud].mean()))
-            verdict[place] = loudness > LOUDER * left[place, ~loud].mean()
+            verdict[place] = loudness > CLEARLY * left[place, ~loud].mean()
     return verdict
 
 
@@ -226,7 +216,7 @@ def _of_top_quarter(outputs: Real) -> NoiseFloor:
     """Take the top quarter of the band for white noise: all that a very short log gives."""
     samples = outputs.shape[1]
     power = np.abs(fft.rfft(outputs - outputs.mean(axis=1, keepdims=True), axis=1)) ** 2 / samples
-    top = power[:, int(TOP_QUARTER * power.shape[1]) :]
+    top = power[:, 3 * power.shape[1] // 4 :]
     return noise_floor_of(
         np.repeat(top.mean(axis=1, keepdims=True), GRID + 1, axis=1),
         samples=samples,

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 from scipy import fft
 
+from chladni.gap.calibration import FAR, FEWEST, NOTICED, SMOOTH
 from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
 from chladni.gap.comparison.local_rational import unreached
 from chladni.gap.comparison.motion_functions import even_functions, odd_functions
@@ -14,18 +15,10 @@ from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Complex, Index, Mask, Real
 from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
+from chladni.spectral.forms import MOTION_ORDER
 
-# Sums of three excited frequencies reach three times as far as the band.
-FARTHEST = 3.0
-# What the basis answers with is taken for smooth over so many lines: a straight line over them.
-LINES = 60
-TERMS = 2
-FEWEST_BLOCKS = 4
-# Blocks whose power isn't so many times that of the noise tell about the noise.
-LEAST_RATIO = 4.0
-# Shares below this come about by chance: three sigma for fifteen blocks of three outputs.
-LEAST_SHARE = 0.03
-INTEGRATIONS = {"m/s^2": 2, "rad/s^2": 2, "m/s": 1, "rad/s": 1}
+#: What the basis answers with is taken for smooth over so many lines: a straight line over them.
+_LINES = 2 * SMOOTH
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +44,7 @@ class ProductsOutside:
     def sentence(self) -> str:
         """Say it."""
         where = f"between {self.motion[0]} and {self.motion[1]}" if len(self.motion) > 1 else f"of {self.motion[0]}"
-        kinds = [kind for kind, share in (("odd", self.odd), ("even", self.even)) if share >= LEAST_SHARE]
+        kinds = [kind for kind, share in (("odd", self.odd), ("even", self.even)) if share >= NOTICED]
         return (
             f"{max(self.both, 0.0):.0%} of the distortion above the excited band follows the motion {where}: "
             f"{max(self.odd, 0.0):.0%} only by odd functions of it, {max(self.even, 0.0):.0%} only by even ones "
@@ -66,7 +59,7 @@ def products_outside(measurement: Measurement) -> ProductsOutside | None:
     motion d the outputs answer linearly, Y(k) = H(k) F(k) with a smooth H. Of every output and every difference of
     two the displacement d is taken as measured on the excited lines. Even functions of it (abs(d), d^2, abs(d)
     beyond a dead zone) and odd ones (the same with the sign of d, d^3, the sign of the velocity) are fitted to Y,
-    each with an H that is straight over 60 lines, and the motion that explains most is given.
+    each with an H that is straight over 62 lines, and the motion that explains most is given.
 
     Returns
     -------
@@ -87,8 +80,8 @@ def products_outside(measurement: Measurement) -> ProductsOutside | None:
     periods = fft.rfft(periods_of(measurement.outputs, period)[:, measurement.transient_periods :], axis=2)
     mean = periods.mean(axis=1)
     noise = np.mean(np.abs(periods - mean[:, None]) ** 2, axis=1) / (periods.shape[1] - 1)
-    loud = (np.abs(mean[:, index]) ** 2).mean(axis=2) > LEAST_RATIO * noise[:, index].mean(axis=2)
-    if np.sum(np.all(loud, axis=0)) < FEWEST_BLOCKS:
+    loud = (np.abs(mean[:, index]) ** 2).mean(axis=2) > FAR * noise[:, index].mean(axis=2)
+    if np.sum(np.all(loud, axis=0)) < FEWEST:
         return None
     index = index[np.all(loud, axis=0)]
     motions = _motions(measurement, mean, excited, period)
@@ -100,11 +93,12 @@ def _blocks(excited: Mask) -> Index | None:
     """``[block, line]`` indices of the lines above the band; None where there are few."""
     highest = int(np.flatnonzero(excited)[-1]) if np.any(excited) else 0
     first = highest + 1
-    last = min(excited.size - 1, int(FARTHEST * highest))
-    count = (last - first) // LINES
-    if highest == 0 or count < FEWEST_BLOCKS:
+    # Sums of three excited frequencies reach three times as far as the band.
+    last = min(excited.size - 1, 3 * highest)
+    count = (last - first) // _LINES
+    if highest == 0 or count < FEWEST:
         return None
-    return (first + np.arange(count * LINES)).reshape(count, LINES)
+    return (first + np.arange(count * _LINES)).reshape(count, _LINES)
 
 
 def _motions(
@@ -122,7 +116,7 @@ def _motions(
         if units[one] == units[other]:
             candidates.append(((names[one], names[other]), inside[other] - inside[one], units[one]))
     for name, row, unit in candidates:
-        order = INTEGRATIONS.get(unit, 0)
+        order = MOTION_ORDER.get(unit, 0)
         spectrum = np.divide(row, (1j * omega) ** order, out=np.zeros_like(row), where=excited)
         displacement, velocity = (fft.irfft(one, period) for one in (spectrum, 1j * omega * spectrum))
         if displacement.std() > 0:
@@ -141,10 +135,11 @@ def _explained(name: tuple[str, ...], motion: tuple[Real, Real], mean: Complex, 
 
 def _share(basis: Complex, targets: Complex) -> float:
     """Share of the power of ``[block, line, output]`` that ``[function, block, line]`` explain beyond chance."""
-    powers = np.linspace(-1, 1, LINES)[:, None] ** np.arange(TERMS)
+    powers = np.linspace(-1, 1, _LINES)[:, None] ** np.arange(2)
     terms = basis.transpose(1, 2, 0)[:, :, :, None] * powers[:, None, :]
     regressors = terms.reshape(*terms.shape[:2], -1)
-    # Output by output, so that a loud one doesn't speak for all; random functions explain their number over LINES.
+    # Output by output, so that a loud one doesn't speak for all; random functions explain their number over
+    # _LINES.
     left = np.sum(np.abs(unreached(regressors, targets)) ** 2, axis=(0, 1))
     whole = np.sum(np.abs(targets) ** 2, axis=(0, 1))
-    return float(1 - np.mean(left / whole) * LINES / (LINES - regressors.shape[2]))
+    return float(1 - np.mean(left / whole) * _LINES / (_LINES - regressors.shape[2]))

@@ -5,28 +5,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import fft
 
+from chladni.gap.calibration import (
+    BLOCK,
+    FAR,
+    FEWEST,
+    GRANTED,
+    MANY,
+    NOTICED,
+    SAME,
+    SOME,
+    TRANSIENT,
+    UNNOTICED,
+)
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Real
-
-SHORTEST_PERIOD = 8
-FEWEST_PERIODS = 2
-# Maxima of the correlation that are looked at; the noise allowed below lowers it to 0.998, a transient further.
-LEAST_CORRELATION = 0.8
-MOST_CANDIDATES = 64
-# What doesn't repeat of an input, over its RMS, in the steady periods: sensors' noise of 3 %, and some scatter.
-LARGEST_SCATTER = 0.035
-# A shorter lag is the period only if it repeats as exactly as the best does: one strong line of many imitates one.
-SCATTER_SLACK = 1.3
-EXACT = 1e-6
-# Inputs that die out after a first event are no repetition.
-LEAST_STEADY_POWER = 0.2
-# A period is transient when its step to the next one has this many times the power of later steps ...
-TRANSIENT_RATIO = 2.0
-# ... and by more than this share of the signal's power, below which data without noise stop mattering.
-TRANSIENT_FLOOR = 1e-8
-# With two periods only, the transient shows in that their difference fades.
-FADING_PARTS = 4
-FADING_RATIO = 2.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +47,7 @@ def find_repetition(measurement: Measurement) -> Repetition | None:
     """Find the shortest whole number of samples after which every input repeats.
 
     A lag is a candidate where the inputs' correlation with themselves has a maximum; it's a period when what
-    doesn't repeat is at most 3.5 % of every input, and as small (within 1.3) as at the best candidate. Any shape
+    doesn't repeat is at most 4 % of every input, and as small (within a quarter) as at the best candidate. Any shape
     repeats: multisines, sines, trains of hits.
 
     Returns
@@ -78,11 +70,11 @@ def find_repetition(measurement: Measurement) -> Repetition | None:
     if not moving.size:
         return None
     tried = [(lag, _scatter(moving, lag)) for lag in _candidates(moving)]
-    repeating = [(lag, scatter) for lag, scatter in tried if scatter <= LARGEST_SCATTER]
+    repeating = [(lag, scatter) for lag, scatter in tried if scatter <= SAME * NOTICED]
     if not repeating:
         return None
     best = min(scatter for _, scatter in repeating)
-    period, scatter = next(one for one in repeating if one[1] <= SCATTER_SLACK * best + EXACT)
+    period, scatter = next(one for one in repeating if one[1] <= SAME * best + UNNOTICED)
     return Repetition(
         period_samples=period,
         periods=measurement.samples // period,
@@ -108,41 +100,41 @@ def periods_of(signals: Real, period: int) -> Real:
 def transient_periods(signals: Real, period: int) -> int:
     """Count leading periods that differ, in any of ``[signal, sample]``, from the next more than later ones do."""
     periods = periods_of(signals, period)
-    if periods.shape[1] == FEWEST_PERIODS:
+    if periods.shape[1] == 2:
         return int(_fades(periods[:, 0] - periods[:, 1], periods[:, 1]))
     # From period to period, so that a machine that drifts slowly all the time isn't taken for one that settles.
     steps = np.mean(np.diff(periods, axis=1) ** 2, axis=2)
-    floor = TRANSIENT_FLOOR * np.var(periods, axis=(1, 2))
+    floor = GRANTED * np.var(periods, axis=(1, 2))
     usual = steps[:, steps.shape[1] // 2 :].mean(axis=1)
-    unsettled = np.any(steps > (TRANSIENT_RATIO * usual + floor)[:, None], axis=0)
+    unsettled = np.any(steps > (TRANSIENT * usual + floor)[:, None], axis=0)
     settled = np.flatnonzero(~unsettled)
     return int(settled[0]) if settled.size else periods.shape[1] - 2
 
 
 def _fades(difference: Real, steady: Real) -> bool:
     """Whether the difference of two periods is larger at its begin than at its end."""
-    samples = difference.shape[1] // FADING_PARTS
-    parts = difference[:, : samples * FADING_PARTS].reshape(len(difference), FADING_PARTS, samples)
+    samples = difference.shape[1] // FEWEST
+    parts = difference[:, : samples * FEWEST].reshape(len(difference), FEWEST, samples)
     power = np.mean(parts**2, axis=2)
-    floor = TRANSIENT_FLOOR * np.var(steady, axis=1)
-    return bool(np.any(power[:, 0] > FADING_RATIO * power[:, -1] + floor))
+    floor = GRANTED * np.var(steady, axis=1)
+    return bool(np.any(power[:, 0] > FAR * power[:, -1] + floor))
 
 
 def _candidates(inputs: Real) -> list[int]:
     """Give lags at which all inputs together correlate with themselves, shortest first."""
     samples = inputs.shape[1]
-    lags = samples // FEWEST_PERIODS + 1
-    if lags <= SHORTEST_PERIOD:
+    lags = samples // 2 + 1
+    if lags <= BLOCK:
         return []
     correlation = np.min([_self_correlation(row - row.mean(), lags) for row in inputs], axis=0)
     # The last lag is looked at as if what follows were lower: exactly two periods are two periods.
     padded = np.append(correlation, -1.0)
     inner = padded[1:-1]
-    peaks = 1 + np.flatnonzero((inner >= padded[:-2]) & (inner > padded[2:]) & (inner > LEAST_CORRELATION))
-    peaks = peaks[peaks >= SHORTEST_PERIOD]
-    if peaks.size > MOST_CANDIDATES:
+    peaks = 1 + np.flatnonzero((inner >= padded[:-2]) & (inner > padded[2:]) & (inner > 0))
+    peaks = peaks[peaks >= BLOCK]
+    if peaks.size > 4 * MANY:
         # Of a narrow band every cycle is a maximum; the highest ones hold the period.
-        peaks = np.sort(peaks[np.argsort(-correlation[peaks], kind="stable")[:MOST_CANDIDATES]])
+        peaks = np.sort(peaks[np.argsort(-correlation[peaks], kind="stable")[: 4 * MANY]])
     return [int(lag) for lag in peaks]
 
 
@@ -161,8 +153,8 @@ def _scatter(inputs: Real, lag: int) -> float:
     """Give what doesn't repeat over what does, of the worst input, without the first period where there are more."""
     periods = periods_of(inputs, lag)
     # A force that was measured feels the machine, so it settles with it.
-    steady = periods[:, 1:] if periods.shape[1] > FEWEST_PERIODS else periods
+    steady = periods[:, 1:] if periods.shape[1] > 2 else periods
     power = np.var(steady.mean(axis=1), axis=1)
-    if np.any(power < LEAST_STEADY_POWER * np.var(inputs, axis=1)):
+    if np.any(power < SOME * np.var(inputs, axis=1)):
         return np.inf
     return float(np.sqrt(np.max(steady.var(axis=1, ddof=1).mean(axis=1) / power)))

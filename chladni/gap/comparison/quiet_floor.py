@@ -2,13 +2,10 @@
 
 import numpy as np
 
+from chladni.gap.calibration import FEWEST_SAMPLES, GRANTED, GRID, SOME
 from chladni.gap.comparison.autoregressive import noise_floor_of
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
-
-#: Quantile of the lines that counts as quiet, and the share of the signal's power that is always granted to noise.
-_QUIET, _LEAST = 0.2, 1e-8
-_SEGMENT = 1024
 
 
 def quiet_floor(measurement: Measurement) -> NoiseFloor:
@@ -19,12 +16,12 @@ def quiet_floor(measurement: Measurement) -> NoiseFloor:
     than with the noise.
     """
     outputs = measurement.outputs - measurement.outputs.mean(axis=1, keepdims=True)
-    length = min(_SEGMENT, max(16, measurement.samples // 8))
+    length = min(GRID, max(FEWEST_SAMPLES // 2, measurement.samples // 8))
     window = np.hanning(length)
     count = measurement.samples // length
     segments = outputs[:, : count * length].reshape(len(outputs), count, length) * window
     density = np.mean(np.abs(np.fft.rfft(segments, axis=2)) ** 2, axis=1) / np.sum(window**2)
-    level = np.quantile(density, _QUIET, axis=1) + _LEAST * np.mean(outputs**2, axis=1)
+    level = np.quantile(density, SOME, axis=1) + GRANTED * np.mean(outputs**2, axis=1)
     return noise_floor_of(
         np.broadcast_to(level[:, None], density.shape),
         samples=measurement.samples,

@@ -4,10 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import FEWEST, RIDGE
 from chladni.signals.arrays import Complex, Real
-
-# Below this freedom a regression on the other outputs explains by chance.
-LEAST_FREEDOM = 4.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,11 +43,11 @@ class ResidualSpectra:
         power = np.einsum("bii->bi", products).real
         outputs = power.shape[1]
         left = self.freedom - (outputs - 1)
-        if outputs == 1 or not np.all(power > 0) or np.any(left < LEAST_FREEDOM):
+        if outputs == 1 or not np.all(power > 0) or np.any(left < FEWEST):
             return self.densities()
         # Outputs differ in size by orders of magnitude; with unit power each, inversion loses nothing.
         scale = np.sqrt(power)
         # Loaded, since residuals without noise can be one signal to the last digit.
-        scaled = products / (scale[:, :, None] * scale[:, None, :]) + 1e-12 * np.eye(outputs)
+        scaled = products / (scale[:, :, None] * scale[:, None, :]) + RIDGE * np.eye(outputs)
         own = power / np.einsum("bii->bi", np.linalg.inv(scaled)).real
         return np.asarray((own * self.freedom / left).T)

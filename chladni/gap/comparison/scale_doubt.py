@@ -1,16 +1,13 @@
 """Whether a model and a log are of one scale at all: what a wrong unit or channel does."""
 
 from collections.abc import Sequence
+from math import exp
 
 import numpy as np
 
+from chladni.gap.calibration import MOST, SLIP
 from chladni.models.effects.wrong_unit import PREFIXES, is_apart, near, short
 from chladni.signals.arrays import Real
-
-#: Least correlation that says it's one signal.
-_ALIKE = 0.5
-#: A model's scale is only so near to a conversion, as a factor.
-_ROUGHLY = 2.0
 
 
 def scale_doubt(measured: Real, simulated: Real, output_names: Sequence[str]) -> str | None:
@@ -36,12 +33,12 @@ def scale_doubt(measured: Real, simulated: Real, output_names: Sequence[str]) ->
     ratios = {
         name: float(np.std(one) / np.std(other))
         for name, one, other in zip(output_names, made, own, strict=True)
-        if abs(one @ other) > _ALIKE * float(np.linalg.norm(one) * np.linalg.norm(other))
+        if abs(one @ other) > MOST * float(np.linalg.norm(one) * np.linalg.norm(other))
     }
     worst = max(ratios, key=lambda name: abs(np.log(ratios[name])), default=None)
     if worst is None or not is_apart(ratios[worst]):
         return None
-    like = (f"; about the factor {words}" for factor, words in PREFIXES if near(ratios[worst], factor, _ROUGHLY))
+    like = (f"; about the factor {words}" for factor, words in PREFIXES if near(ratios[worst], factor, exp(SLIP)))
     return (
         f"At {worst} the model as it is gives {short(ratios[worst])} times what was measured: "
         f"check its channel and unit, and the inputs'{next(like, '')}."

@@ -11,30 +11,24 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft
 
+from chladni.gap.calibration import (
+    BANDS,
+    CLEARLY,
+    LINES_APART,
+    LISTED,
+    LITTLE,
+    OUTSIDE,
+    PIECES,
+    QUARTER,
+    SAME,
+    SLIGHT,
+    SOME,
+)
 from chladni.gap.records.diagnosis import BandShare, ChannelGap, RegimeShare
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.spectral.windows import window_samples
-
-BANDS = 10
-# Bands span the frequencies between which all but this share of measured power and gap lies, on either side.
-TAIL = 1e-3
-FEWEST_LINES = 3
-# Quantiles of a variable between which regimes are cut; beside them stands the one around zero.
-QUANTILES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
-AROUND_ZERO = 0.2
-MOST_REGIMES = 6
-# A regime is told when its share exceeds its share of time by this factor, and by so many standard errors.
-LEAST_EXCESS = 1.25
-LEAST_SIGMAS = 3.0
-# What a gap that grows with the motion would hold is a guess: wrong parameters alone exceed it by less than this, but
-# for one log in five.
-BEYOND_MOTION = 1.5
-BLOCKS = 64
-# Slices of the map over time; twice the square root of the samples balances them with lines.
-LONGEST_SLICE = 1024
-SHORTEST_SLICE = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,7 +153,7 @@ def regime_shares(
         found += _apart([_regime(name, values, power, expected, edges) for edges in _regimes(values)])
     # Each variable has its say first; the strongest of all are told.
     found.sort(key=lambda regime: -regime.excess)
-    return tuple(regime.told for regime in found[:MOST_REGIMES])
+    return tuple(regime.told for regime in found[:LISTED])
 
 
 def gap_map(residual: Real, measured: Real, sample_rate_hz: float) -> tuple[Real, Real, Real]:
@@ -176,8 +170,8 @@ def gap_map(residual: Real, measured: Real, sample_rate_hz: float) -> tuple[Real
         it integrates to the square of the pooled gap of that slice.
     """
     samples = residual.shape[1]
-    length = 2 ** round(np.log2(2 * np.sqrt(samples)))
-    length = min(max(length, SHORTEST_SLICE), LONGEST_SLICE, samples)
+    # Twice the square root of the samples balances slices with lines.
+    length = min(2 ** round(np.log2(2 * np.sqrt(samples))), samples)
     window, hop = window_samples("hann", length), max(1, length // 2)
     segments = sliding_window_view(relative_residual(residual, measured), length, axis=1)[:, ::hop]
     density = np.mean(np.abs(fft.rfft(segments * window, axis=2)) ** 2, axis=0)
@@ -216,7 +210,7 @@ def _noise_shares(
 def _mode_edges_hz(modes_hz: Sequence[float], frequency_hz: Real) -> Real:
     modes = np.sort(np.asarray(modes_hz, dtype=np.float64))
     inner = np.sqrt(modes[:-1] * modes[1:])
-    top_hz, apart_hz = float(frequency_hz[-1]), FEWEST_LINES * float(frequency_hz[1])
+    top_hz, apart_hz = float(frequency_hz[-1]), LINES_APART * float(frequency_hz[1])
     return _spaced([*inner, *(2 * modes[-1:])], top_hz, apart_hz)
 
 
@@ -226,9 +220,9 @@ def _log_edges_hz(gap: Real, whole: Real, frequency_hz: Real) -> Real:
         return np.array([0.0, frequency_hz[-1]])
     rising = np.cumsum(power) / power.sum()
     # Rounding may leave the last sum below 1.
-    first, last = (min(int(np.searchsorted(rising, at)), power.size - 1) for at in (TAIL, 1 - TAIL))
+    first, last = (min(int(np.searchsorted(rising, at)), power.size - 1) for at in (SLIGHT, 1 - SLIGHT))
     low_hz, high_hz = float(frequency_hz[1 + first]), float(frequency_hz[1 + last])
-    top_hz, apart_hz = float(frequency_hz[-1]), FEWEST_LINES * float(frequency_hz[1])
+    top_hz, apart_hz = float(frequency_hz[-1]), LINES_APART * float(frequency_hz[1])
     return _spaced(np.geomspace(max(low_hz, apart_hz), max(high_hz, 2 * apart_hz), BANDS + 1), top_hz, apart_hz)
 
 
@@ -243,8 +237,10 @@ def _spaced(inner_hz: Sequence[float] | Real, top_hz: float, apart_hz: float) ->
 
 
 def _regimes(values: Real) -> list[tuple[float, float]]:
-    edges = np.unique(np.quantile(values, QUANTILES))
-    near = float(np.quantile(np.abs(values), AROUND_ZERO))
+    # Beside these stands the regime around zero.
+    lower = (0.0, LITTLE, QUARTER, 0.5)
+    edges = np.unique(np.quantile(values, [*lower, *(1.0 - one for one in lower)]))
+    near = float(np.quantile(np.abs(values), SOME))
     bins = [(float(low), float(high)) for low, high in pairwise(edges)]
     # A variable that never changes sign has no motion around zero.
     return [*bins, (-near, near)] if near > 0 and values.min() < 0 < values.max() else bins
@@ -265,12 +261,12 @@ def _regime(name: str, values: Real, power: Real, expected: Real, edges: tuple[f
     excess = share - time
     # Over stretches of the record, since neighbouring samples tell the same; from one stretch to the next, since an
     # amplitude that rises and falls over the record isn't what scatters.
-    parts = np.array_split(power * (inside - time), BLOCKS)
+    parts = np.array_split(power * (inside - time), PIECES)
     sums = np.array([part.sum() for part in parts]) / power.sum()
-    error = float(np.sqrt(BLOCKS * np.mean(np.diff(sums) ** 2) / 2))
+    error = float(np.sqrt(PIECES * np.mean(np.diff(sums) ** 2) / 2))
     told = RegimeShare(variable=name, low=low, high=high, share=share, time=time)
-    least = max(LEAST_EXCESS * time, BEYOND_MOTION * float(expected[inside].sum()))
-    counts = share >= least and excess > LEAST_SIGMAS * error
+    least = max(SAME * time, CLEARLY * float(expected[inside].sum()))
+    counts = share >= least and excess > OUTSIDE * error
     return _Regime(told=told, excess=excess if counts else 0.0, inside=edges)
 
 

@@ -2,18 +2,10 @@
 
 import numpy as np
 
+from chladni.gap.calibration import EFFECTIVE_SAMPLES, TIMES, UNNOTICED, USUAL_S
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.signals.arrays import Complex, Real
-
-#: With fewer, every fit of a few numbers follows.
-FEW_SAMPLES = 200
-#: Cycles of the lowest mode, or times of the slowest decay, that show what a model does of itself.
-_SHOWN = 3.0
-#: Seconds that show a body which only its inertia holds; a slow decay is hardly more than that.
-_OF_INERTIA_S = 1.0
-#: Poles below this share of the fastest are rigid-body motion or integrators, which have no cycle.
-_AT_REST = 1e-7
 
 
 def shortness(compiled: CompiledModel, measurement: Measurement) -> str | None:
@@ -23,12 +15,12 @@ def shortness(compiled: CompiledModel, measurement: Measurement) -> str | None:
     samples, and each follows them down to the noise.
     """
     duration_s, found = measurement.duration_s, []
-    if measurement.samples < FEW_SAMPLES:
-        found.append(f"{measurement.samples} samples, where {FEW_SAMPLES} or more tell more")
+    if measurement.samples < EFFECTIVE_SAMPLES:
+        found.append(f"{measurement.samples} samples, where {EFFECTIVE_SAMPLES} or more tell more")
     modes_hz, shown_s = modes_of(compiled), _shown_s(compiled)
     if duration_s < shown_s and modes_hz.size:
         cycles = f"{duration_s * modes_hz.min():.2g} cycles of the lowest mode ({modes_hz.min():.3g} Hz)"
-        found.append(f"{duration_s:.3g} s hold {cycles}, where {_SHOWN:g} or more tell more")
+        found.append(f"{duration_s:.3g} s hold {cycles}, where {TIMES:g} or more tell more")
     elif duration_s < shown_s:
         found.append(f"{duration_s:.3g} s, where the model shows what it does of itself in {shown_s:.2g} s")
     if not found:
@@ -42,7 +34,7 @@ def shortness(compiled: CompiledModel, measurement: Measurement) -> str | None:
 def modes_of(compiled: CompiledModel) -> Real:
     """Natural frequencies of the model's vibrating modes in Hz, one for each pair of poles."""
     poles = _poles(compiled)
-    vibrating = poles.imag > _AT_REST * float(np.abs(poles).max(initial=0.0))
+    vibrating = poles.imag > UNNOTICED * float(np.abs(poles).max(initial=0.0))
     return np.asarray(np.abs(poles[vibrating]) / (2 * np.pi))
 
 
@@ -52,10 +44,10 @@ def _shown_s(compiled: CompiledModel) -> float:
     if not poles.size:
         return 0.0
     if modes_hz.size:
-        return _SHOWN / float(modes_hz.min())
+        return TIMES / float(modes_hz.min())
     rates = np.abs(poles)
-    slowest = float(rates[rates > _AT_REST * rates.max()].min(initial=np.inf))
-    return min(_OF_INERTIA_S, _SHOWN / slowest) if np.isfinite(slowest) else _OF_INERTIA_S
+    slowest = float(rates[rates > UNNOTICED * rates.max()].min(initial=np.inf))
+    return min(USUAL_S, TIMES / slowest) if np.isfinite(slowest) else USUAL_S
 
 
 def _poles(compiled: CompiledModel) -> Complex:

@@ -3,21 +3,12 @@
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
-from chladni.gap.comparison.shares import LEAST_EXCESS, relative_residual
+from chladni.gap.calibration import BLOCK, LISTED, OUTSIDE, PIECES, ROUNDING, SAME
+from chladni.gap.comparison.shares import relative_residual
 from chladni.gap.records.diagnosis import TimeShare
 from chladni.signals.arrays import Real
-
-# Ends of a stretch are told to this part of the record, of a short one to so many samples.
-PIECES = 64
-SHORTEST_PIECE = 8
-MOST_TIMES = 6
-# More than the usual three: the stretch was chosen among two thousand, some of which stand out by chance.
-LEAST_SIGMAS = 5.0
-# Pieces without any gap have no logarithm; this far below the mean nothing is told of them.
-FLOOR = 1e-9
-# Of a normal variable: median size of the difference of two, in standard deviations.
-MEDIAN_DIFFERENCE = 0.6745 * np.sqrt(2)
 
 
 def time_shares(residual: Real, measured: Real, *, sample_rate_hz: float) -> tuple[TimeShare, ...]:
@@ -25,8 +16,9 @@ def time_shares(residual: Real, measured: Real, *, sample_rate_hz: float) -> tup
 
     The record is cut into 64 pieces of equal length, fewer when it's short. The stretch of neighbouring pieces told
     first is the one with the largest sum of (share of the gap's power - 1.25 share of time); the next ones are found
-    in the same way before and behind it. A stretch counts when its power exceeds the record's mean by five standard
-    errors, on a logarithmic scale and with the scatter between neighbouring pieces.
+    in the same way before and behind it. A stretch counts when its power exceeds the
+    record's mean by more than chance gives the best of all stretches, as three standard errors do for one, on a
+    logarithmic scale and with the scatter between neighbouring pieces.
 
     Parameters
     ----------
@@ -50,27 +42,30 @@ def time_shares(residual: Real, measured: Real, *, sample_rate_hz: float) -> tup
     (TimeShare(start_s=32.0, end_s=48.0, share=1.0),)
     """
     power = np.mean(relative_residual(residual, measured) ** 2, axis=0)
-    pieces = min(PIECES, power.size // SHORTEST_PIECE)
+    pieces = min(PIECES, power.size // BLOCK)
     if pieces < 2 or not power.sum() > 0:
         return ()
     edges = np.linspace(0, power.size, pieces + 1).round().astype(np.intp)
     shares, times = np.add.reduceat(power, edges[:-1]) / power.sum(), np.diff(edges) / power.size
-    scatter = _scatter(np.log(np.maximum(shares / times, FLOOR)))
+    # Beyond three sigma; the stretch was chosen among many, some of which stand out by chance.
+    sigmas = -float(ndtri(ndtr(-OUTSIDE) / (pieces * (pieces + 1) / 2)))
+    scatter = _scatter(np.log(np.maximum(shares / times, ROUNDING)))
     found = [
         TimeShare(
             start_s=float(edges[first] / sample_rate_hz),
             end_s=float(edges[stop] / sample_rate_hz),
             share=float(shares[first:stop].sum()),
         )
-        for first, stop in _stretches(shares - LEAST_EXCESS * times, 0, pieces)
-        if _stands_out(shares[first:stop], times[first:stop], scatter)
+        for first, stop in _stretches(shares - SAME * times, 0, pieces)
+        if _stands_out(shares[first:stop], times[first:stop], sigmas * scatter)
     ]
-    return tuple(sorted(found, key=lambda one: -one.share)[:MOST_TIMES])
+    return tuple(sorted(found, key=lambda one: -one.share)[:LISTED])
 
 
 def _scatter(level: Real) -> float:
     """Standard deviation of a piece's level, from neighbours: a gap that comes and goes changes few of them."""
-    return float(np.median(np.abs(np.diff(level))) / MEDIAN_DIFFERENCE)
+    # Of a normal variable: median size of the difference of two, in standard deviations.
+    return float(np.median(np.abs(np.diff(level))) / (np.sqrt(2) * ndtri(0.75)))
 
 
 def _stretches(gain: Real, first: int, stop: int) -> Iterator[tuple[int, int]]:
@@ -88,4 +83,4 @@ def _stretches(gain: Real, first: int, stop: int) -> Iterator[tuple[int, int]]:
 
 
 def _stands_out(shares: Real, times: Real, scatter: float) -> bool:
-    return bool(np.log(shares.sum() / times.sum()) > LEAST_SIGMAS * scatter / np.sqrt(shares.size))
+    return bool(np.log(shares.sum() / times.sum()) > scatter / np.sqrt(shares.size))

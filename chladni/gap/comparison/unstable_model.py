@@ -2,12 +2,10 @@
 
 import numpy as np
 
+from chladni.gap.calibration import LISTED
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.stability import growing_poles
 from chladni.signals.arrays import Complex
-
-#: Poles that are listed.
-_LISTED = 4
 
 
 def instability(name: str, compiled: CompiledModel) -> str | None:
@@ -41,8 +39,8 @@ def instability_found(nominal: CompiledModel, found: CompiledModel) -> str | Non
 def _told(poles: Complex) -> str:
     """Poles from the fastest growing one on, and how fast that is."""
     ordered = poles[np.argsort(-poles.real)]
-    listed = ", ".join(_pole(pole) for pole in ordered[:_LISTED])
-    more = "" if poles.size <= _LISTED else f" and {poles.size - _LISTED} more"
+    listed = ", ".join(_pole(pole) for pole in ordered[:LISTED])
+    more = "" if poles.size <= LISTED else f" and {poles.size - LISTED} more"
     word = "a pole" if poles.size == 1 else "poles"
     return f"{word} at {listed}{more} rad/s, so that any error grows e-fold in {1.0 / ordered[0].real:.2g} s"
 

@@ -6,15 +6,12 @@ from math import ceil, floor
 
 import numpy as np
 
+from chladni.gap.calibration import FEWEST_SAMPLES, MOST, SLIGHT
 from chladni.signals.arrays import Mask
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import counted
 
-# With fewer samples nothing can be told apart from noise at all.
-FEWEST_SAMPLES = 32
-# A stretch without gaps stands for the log when it is at least this share of it.
-LEAST_SHARE = 0.5
 # Times to cut at are told to a tenth of a millisecond.
 _TOLD_HZ = 1e4
 
@@ -72,7 +69,7 @@ def whole_stretch(
             f"{read.log}: {samples / rate_hz:g} s at {rate_hz:g} Hz are {counted(samples, 'sample')}; at least "
             f"{FEWEST_SAMPLES} samples are needed; take a longer part, or record longer"
         )
-    if length < LEAST_SHARE * samples or length < FEWEST_SAMPLES:
+    if length < MOST * samples or length < FEWEST_SAMPLES:
         raise LogError(_too_little(recording, rows, needed, stretch, read))
     if length == samples:
         return stretch, ()
@@ -105,7 +102,7 @@ def _too_little(
         todo.append(f"take that stretch alone ({_options(stretch, rate_hz, read.begins_s)})")
     others = _longest(good_samples(recording, [row for row in rows if row != worst]))
     # Only where it's the one channel that has the gaps, and one of several that are compared.
-    if worst not in needed and others.stop - others.start >= LEAST_SHARE * recording.samples:
+    if worst not in needed and others.stop - others.start >= MOST * recording.samples:
         todo.append("leave that output out of the model")
     if not todo:
         todo.append("record it without gaps")
@@ -122,7 +119,7 @@ def _too_little(
 def _options(stretch: slice, rate_hz: float, begins_s: float) -> str:
     """Options of the command line that give a stretch, and no sample beyond."""
     # Rounding of the sum must not cost a sample, nor take one in.
-    start_s = ceil((begins_s + stretch.start / rate_hz) * _TOLD_HZ - 1e-3) / _TOLD_HZ
-    end_s = floor((begins_s + stretch.stop / rate_hz) * _TOLD_HZ + 1e-3) / _TOLD_HZ
+    start_s = ceil((begins_s + stretch.start / rate_hz) * _TOLD_HZ - SLIGHT) / _TOLD_HZ
+    end_s = floor((begins_s + stretch.stop / rate_hz) * _TOLD_HZ + SLIGHT) / _TOLD_HZ
     start = f"--start {start_s:.10g} " if start_s > 0 else ""
     return f"{start}--end {end_s:.10g}"

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from chladni.gap.calibration import ALONE
 from chladni.gap.design.experiment import Experiment
 from chladni.gap.design.imitation import Part, sums_of
 from chladni.gap.design.rival import Prediction, Rival
@@ -13,9 +14,6 @@ from chladni.gap.plant.free_run import FreeRun, Windows
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Real
-
-#: Share of the noise's power that details of a law may leave without counting against it.
-SLACK = 0.3
 
 
 class Course:
@@ -94,7 +92,7 @@ class Course:
         wanted = self.predictions[pair[0]].outputs
         power = np.mean(noise.whitened(wanted)[rows] ** 2, axis=-1)
         sums = self._sums(noise, pair) if at is None else self._sums_at(noise, pair, at)
-        return Part(gain * sums[:, rows], 1.0 + SLACK + gain * detail[rows] * power, wanted.shape[-1])
+        return Part(gain * sums[:, rows], ALONE + gain * detail[rows] * power, wanted.shape[-1])
 
     def _sums(self, noise: NoiseFloor, pair: tuple[int, int]) -> Real:
         if pair not in self._kept:

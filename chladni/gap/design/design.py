@@ -2,10 +2,8 @@
 
 from dataclasses import dataclass
 
+from chladni.gap.calibration import BEYOND_DOUBT
 from chladni.gap.design.experiment import Change
-
-#: Nats that a measurement must bring beyond what a mere repetition of the log would.
-ENOUGH = 6.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +33,7 @@ class Design:
     @property
     def tells(self) -> bool:
         """Whether it tells candidates apart that the log leaves close."""
-        return self.nats > 2.0 * self.now_nats + ENOUGH
+        return self.nats > 2.0 * self.now_nats + BEYOND_DOUBT
 
     @property
     def sigmas(self) -> float:

@@ -8,17 +8,16 @@ from chladni.signals.arrays import Real
 from chladni.signals.value import Value
 
 Change = Literal["nothing", "level", "repeats", "band", "sweep", "slow", "sensor", "position"]
-#: What changes ask of people, from a knob that is turned to a machine that is rebuilt.
-EFFORT: dict[Change, float] = {
-    "nothing": 0.0,
-    "level": 1.0,
-    "repeats": 1.2,
-    "band": 2.0,
-    "sweep": 2.0,
-    "slow": 2.0,
-    "sensor": 3.0,
-    "position": 4.0,
-}
+
+_KINDS: tuple[tuple[Change, ...], ...] = (
+    ("nothing",),
+    ("level", "repeats"),
+    ("band", "sweep", "slow"),
+    ("sensor",),
+    ("position",),
+)
+#: What changes ask of people, from a knob that is turned to a machine that is rebuilt: a rank.
+EFFORT = {change: float(rank) for rank, kind in enumerate(_KINDS) for change in kind}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.gap.calibration import CYCLES, FORMS, LITTLE, PLACES, SAMPLES_A_CYCLE, SOME, TAIL
+from chladni.gap.comparison.short_log import modes_of
 from chladni.gap.design.experiment import Change, Experiment
 from chladni.gap.plant.windows import windows_for
 from chladni.gap.records.measurement import Measurement
@@ -16,18 +18,6 @@ from chladni.signals.arrays import Real
 from chladni.signals.unit_text import with_unit
 
 Band = tuple[float, float]
-#: Levels that are tried, the nearest first; four times what the log holds is as far as it's safe to ask for.
-LEVELS = (2.0, 0.5, 4.0, 0.25)
-#: Records that are averaged: half the noise, a quarter.
-_REPEATS = (4, 16)
-#: Modes that are shaken one at a time, and the band around each over its frequency.
-_MODES, _AROUND = 3, 0.2
-#: A slow sine stays so far below the lowest mode that the machine follows it as a spring.
-_SLOW = 0.15
-#: Bodies that the input is moved to.
-_BODIES = 4
-#: Highest frequency over the sample rate that is asked for.
-_HIGHEST = 0.4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +46,11 @@ class Reach:
         """``[input]`` RMS."""
         return np.asarray(np.sqrt(np.mean(self.measurement.inputs**2, axis=1)), dtype=np.float64)
 
+    @property
+    def _top_hz(self) -> float:
+        """Highest frequency that is asked for."""
+        return self.measurement.sample_rate_hz / SAMPLES_A_CYCLE
+
     def experiment(self, change: Change, words: str, inputs: Real, *, level: float | None = None) -> Experiment:
         """Give an experiment on the model as it is."""
         start = level if level is not None and self.begins_with_log else 0.0
@@ -68,14 +63,14 @@ class Reach:
     def levels(self) -> Iterator[Experiment]:
         """Give the log's own excitation, louder and quieter, and averaged."""
         logged = self.as_logged()
-        for factor in LEVELS:
+        for factor in (2.0, 0.5, 4.0, 0.25):
             words = f"Repeat with {self._driven()} at {factor:g} times the level{self._told(factor * self.rms)}"
             louder = self.experiment("level", words, factor * self.measurement.inputs, level=factor)
             # Twice is less to ask for than four times.
             yield replace(louder, further=0.5 * (abs(float(np.log2(factor))) - 1.0))
-        for place, count in enumerate(_REPEATS):
+        for place, count in enumerate((4, 16)):
             words = f"Repeat the same input {count} times and average the responses"
-            yield replace(logged, change="repeats", words=words, repeats=count, further=0.6 * place)
+            yield replace(logged, change="repeats", words=words, repeats=count, further=(place + 1) / 3)
 
     def courses(self) -> Iterator[Experiment]:
         """Give other bands, sweeps and a slow sine, all at the log's RMS or peak."""
@@ -85,14 +80,14 @@ class Reach:
         middle = float(np.sqrt(low * high))
         bands = [(low, middle), (middle, high)]
         modes = self._modes_hz()
-        bands += [((1 - _AROUND) * one, (1 + _AROUND) * one) for one in modes[:_MODES]]
+        bands += [((1 - SOME) * one, (1 + SOME) * one) for one in modes[:PLACES]]
         for band in bands:
             yield from self._noise(band)
         span = self._wide(low, high, modes)
         yield self._sweep(span, "up")
         yield self._sweep((span[1], span[0]), "down")
         if modes:
-            yield from self._slow(_SLOW * modes[0])
+            yield from self._slow(LITTLE * modes[0])
 
     def positions(self) -> Iterator[Experiment]:
         """Give the same force at other bodies."""
@@ -103,7 +98,7 @@ class Reach:
         for place, one in enumerate(model.inputs):
             if one.kind != "force" or one.at not in bodies or self.rms[place] == 0:
                 continue
-            for body in [body for body in bodies if body != one.at][:_BODIES]:
+            for body in [body for body in bodies if body != one.at][:FORMS]:
                 inputs = tuple(replace(two, at=body) if two is one else two for two in model.inputs)
                 words = f"Repeat with {one.name} at {body} instead of {one.at}"
                 moved = self.experiment("position", words, self.measurement.inputs)
@@ -122,7 +117,7 @@ class Reach:
 
     def _noise(self, band: Band) -> Iterator[Experiment]:
         measurement = self.measurement
-        step, top = 1.0 / measurement.duration_s, _HIGHEST * measurement.sample_rate_hz
+        step, top = 1.0 / measurement.duration_s, measurement.sample_rate_hz / SAMPLES_A_CYCLE
         low, high = max(band[0], step), min(band[1], top)
         if high - low < 4 * step:
             return
@@ -160,16 +155,15 @@ class Reach:
 
     def _modes_hz(self) -> list[float]:
         """Frequencies of the modes that the log can show, rising."""
-        poles = np.linalg.eigvals(self.model.compile().a)
-        turning = np.unique(np.abs(poles[poles.imag > 1e-3 * np.abs(poles)]).round(9)) / (2 * np.pi)
-        seen = (turning > 4.0 / self.measurement.duration_s) & (turning < _HIGHEST * self.measurement.sample_rate_hz)
+        turning = np.sort(modes_of(self.model.compile()))
+        seen = (turning > CYCLES / self.measurement.duration_s) & (turning < self._top_hz)
         return [float(one) for one in turning[seen]]
 
     def _wide(self, low: float, high: float, modes: list[float]) -> Band:
         """Band of the log, widened to hold its modes."""
         if modes:
             low, high = min(low, 0.5 * modes[0]), max(high, 1.5 * modes[-1])
-        return max(low, 1.0 / self.measurement.duration_s), min(high, _HIGHEST * self.measurement.sample_rate_hz)
+        return max(low, 1.0 / self.measurement.duration_s), min(high, self._top_hz)
 
     def _driven(self) -> str:
         names = [name for name, rms in zip(self.measurement.input_names, self.rms, strict=True) if rms > 0]
@@ -190,7 +184,7 @@ def excited_band_hz(measurement: Measurement) -> Band:
     signals = signals / np.where(size > 0, size, 1.0)
     total = np.cumsum(np.sum(np.abs(np.fft.rfft(signals, axis=1)) ** 2, axis=0))
     if not total[-1] > 0:
-        return 1.0 / measurement.duration_s, _HIGHEST * measurement.sample_rate_hz
-    low, high = np.searchsorted(total / total[-1], (0.005, 0.995))
+        return 1.0 / measurement.duration_s, measurement.sample_rate_hz / SAMPLES_A_CYCLE
+    low, high = np.searchsorted(total / total[-1], (TAIL, 1 - TAIL))
     step = measurement.sample_rate_hz / measurement.samples
     return float(max(low, 1) * step), float(max(high, low + 2) * step)

@@ -5,15 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import PROFILE_STEPS, ROUNDING
 from chladni.gap.design.rival import Prediction, Rival
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.bounded_step import bounded_step
 from chladni.signals.arrays import Real
-
-#: Rounds of reweighing: an output that can't be imitated must not rule over those that can.
-_ROUNDS = 6
-#: Keeps equations of initial states regular that no sensor sees.
-_RIDGE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +66,7 @@ def imitated(rival: Rival, at: Real, parts: Sequence[Part]) -> tuple[Real, list[
     """
     left = [part.sums[..., 0, 0].sum(axis=0) / part.samples for part in parts]
     step = np.zeros(rival.unknowns)
-    for _ in range(_ROUNDS):
+    for _ in range(PROFILE_STEPS):
         weighed = [
             np.tensordot(part.sums, 1.0 / (part.scale + one), axes=([1], [0]))
             for part, one in zip(parts, left, strict=True)
@@ -106,5 +102,5 @@ def _eliminated(sums: Real, known: int) -> Real:
     # States that print nothing keep a one in the scaled equations.
     root = np.sqrt(np.where(size > 0, size, 1.0))
     scaled = local / root[:, :, None] / root[:, None, :]
-    scaled += np.eye(local.shape[-1]) * np.where(size > 0, _RIDGE, 1.0)[:, None, :]
+    scaled += np.eye(local.shape[-1]) * np.where(size > 0, ROUNDING, 1.0)[:, None, :]
     return np.asarray(np.linalg.solve(scaled, cross / root[:, :, None]) / root[:, :, None], dtype=np.float64)

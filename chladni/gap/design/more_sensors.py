@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.gap.calibration import ZERO
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
@@ -76,7 +77,7 @@ def with_noise_of(noise: NoiseFloor, units: Sequence[str], more_units: Sequence[
     signals
         ``[output, sample]`` of all, the new ones last.
     """
-    size = np.maximum(np.std(signals, axis=1), np.finfo(np.float64).tiny)
+    size = np.maximum(np.std(signals, axis=1), ZERO)
     count = len(units)
     relative = float(np.median(noise.rms / size[:count]))
     new = np.empty(len(more_units))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import LONGEST, STEP
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.law_plant import Setting, fine_run, slopes_of
@@ -12,11 +13,6 @@ from chladni.gap.plant.tunable import Tunables
 from chladni.gap.tuning.decay import decay
 from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers, with_numbers
 from chladni.signals.arrays import Real
-
-#: How far an effect's parameter may go in one linear step, in factors of e.
-_TRUST = 1.0
-#: Step of differences, in ln(value).
-_APART = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +56,8 @@ class Rival:
         fitted = hypothesis.fitted if len(hypothesis.fitted) == len(fit.effects) else None
         self._numbers: tuple[EffectNumber, ...] = effect_numbers(fit.effects, fitted)
         limit, sure = tunables.limits(hypothesis.freed), tunables.precision(hypothesis.freed)
-        low = [max(one.low, -_TRUST) for one in self._numbers]
-        high = [min(one.high, _TRUST) for one in self._numbers]
+        low = [max(one.low, -LONGEST) for one in self._numbers]
+        high = [min(one.high, LONGEST) for one in self._numbers]
         #: Bounds on the unknowns, which are 0 at the fit.
         self.low = np.concatenate([np.minimum(-limit - fit.z, 0.0), low])
         self.high = np.concatenate([np.maximum(limit - fit.z, 0.0), high])
@@ -120,5 +116,5 @@ class Rival:
         return Setting(self._z + x[:count], with_numbers(self._effects, self._numbers, x[count:]))
 
     def _steps(self, x: Real) -> Real:
-        steps = np.concatenate([_APART / self._tolerance, np.full(len(self._numbers), _APART)])
+        steps = np.concatenate([STEP / self._tolerance, np.full(len(self._numbers), STEP)])
         return np.asarray(np.where(x + steps > self.high, -steps, steps))

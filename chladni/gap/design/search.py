@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from chladni.gap.calibration import LINES, LITTLE, PLACES, PROFILE_STEPS, ZERO
 from chladni.gap.design.course import Course
 from chladni.gap.design.design import Design
 from chladni.gap.design.experiment import Change, Experiment
@@ -21,15 +22,6 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError, ModelError
-
-#: Samples that are simulated of each experiment.
-_SAMPLES = 6000
-#: Share of a stretch from the middle of a log over which its inputs are faded in.
-_FADE = 0.1
-#: Candidates that are compared.
-_RIVALS = 3
-#: Linear steps of the refits behind the numbers that are told.
-_PASSES = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,14 +61,14 @@ class Search:
         *,
         seed: int,
     ) -> None:
-        candidates = candidates[:_RIVALS]
+        candidates = candidates[:PLACES]
         #: Kinds of changes that `best` looked at.
         self.tried: frozenset[Change] = frozenset()
         self._rivals = [Rival(one, tunables) for one in candidates]
         suspects = {named.site.split(".")[0] for one in candidates for named in one.hypothesis.named}
         self._sensors = more_sensors(model, measurement, suspects)
         self._own = tuple(range(len(measurement.output_names)))
-        stretch, begin, self._windows = _stretch(measurement, candidates, _SAMPLES)
+        stretch, begin, self._windows = _stretch(measurement, candidates, 4 * LINES)
         self._duration_s = measurement.duration_s
         self._reach = Reach(
             model=with_sensors(model, self._sensors), measurement=stretch, begins_with_log=begin == 0, seed=seed
@@ -88,7 +80,7 @@ class Search:
         )
         detail = _details(candidates[0], all_noise, self._logged.outputs)
         self._separation = Separation(self._rivals, all_noise, detail)
-        self.now_nats = self._nats([(self._logged, self._own)], _PASSES)
+        self.now_nats = self._nats([(self._logged, self._own)], PROFILE_STEPS // 2)
 
     def best(self) -> tuple[Design, ...]:
         """Designs that tell the candidates apart, the least effort first; else the one that comes nearest.
@@ -154,7 +146,7 @@ class Search:
         return _Found(design, course, chosen)
 
     def _precise(self, found: _Found) -> _Found:
-        nats = self._nats([(self._logged, self._own), (found.course, found.chosen)], _PASSES)
+        nats = self._nats([(self._logged, self._own), (found.course, found.chosen)], PROFILE_STEPS // 2)
         return replace(found, design=replace(found.design, nats=nats))
 
     def _nats(self, records: list[Record], passes: int) -> float:
@@ -168,7 +160,7 @@ class Search:
 
 def _details(best: Contestant, noise: NoiseFloor, outputs: Real) -> Real:
     """``[output]`` share of its power that the best candidate leaves beyond noise."""
-    power = np.maximum(np.mean(noise.whitened(outputs) ** 2, axis=-1), np.finfo(np.float64).tiny)
+    power = np.maximum(np.mean(noise.whitened(outputs) ** 2, axis=-1), ZERO)
     count = best.held.size
     own = np.maximum(best.held - 1.0, 0.0) / power[:count]
     return np.concatenate([own, np.full(power.size - count, np.median(own))])
@@ -185,14 +177,17 @@ def _stretch(
     # What changes at a time of its own is seen in the whole log only.
     timed = any(effect.kind.clues.timed for one in candidates for effect in one.hypothesis.effects)
     count = measurement.samples if timed else min(most, measurement.samples)
-    power = np.sum(measurement.outputs**2 / np.maximum(np.var(measurement.outputs, axis=1), 1e-300)[:, None], axis=0)
+    power = np.sum(
+        measurement.outputs**2 / np.maximum(np.var(measurement.outputs, axis=1), ZERO)[:, None],
+        axis=0,
+    )
     begins = np.arange(0, measurement.samples - count + 1, count)
     loud = np.array([float(np.mean(power[begin : begin + count])) for begin in begins])
-    begin = int(begins[np.argmin(np.abs(np.log(np.maximum(loud, 1e-300) / np.mean(power))))])
+    begin = int(begins[np.argmin(np.abs(np.log(np.maximum(loud, ZERO) / np.mean(power))))])
     part = _part(measurement, begin, begin + count)
     if begin:
         # From rest in the middle of a course: a jump would shake all modes as the log never did.
-        fade = np.minimum(np.arange(count) / (_FADE * count), 1.0)
+        fade = np.minimum(np.arange(count) / (LITTLE * count), 1.0)
         part = replace(part, inputs=part.inputs * np.sin(0.5 * np.pi * fade) ** 2)
     return part, begin, None
 

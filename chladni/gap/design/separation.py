@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import EFFECTIVE_SAMPLES
 from chladni.gap.design.course import Course
 from chladni.gap.design.imitation import imitated
 from chladni.gap.design.rival import Rival
-from chladni.gap.explanation.contest import EFFECTIVE_SAMPLES
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from chladni.gap.calibration import CYCLES_ASKED, LINES, LITTLE, LOCATED, LOUD, NEAR_DEG, ZERO
+from chladni.gap.comparison.short_log import modes_of
 from chladni.gap.design.experiments import excited_band_hz
 from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise_of, with_sensors
 from chladni.gap.design.site_angles import angles_deg
@@ -17,15 +19,6 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
-
-#: Cycles of the lowest mode that tell its frequency within a percent or so.
-CYCLES = 20.0
-#: Noise over signal above which little can be said of anything.
-LOUD = 0.3
-#: Patterns nearer to each other than this are hard to tell apart in noise.
-NEAR_DEG = 10.0
-_LINES = 200
-_SITES = 5
 
 
 def what_is_missing(
@@ -57,25 +50,24 @@ def what_is_missing(
 
 def _length(model: Model, measurement: Measurement) -> str | None:
     """Ask for a longer record when the lowest mode turns only a few times."""
-    poles = np.linalg.eigvals(model.compile().a)
-    turning = np.abs(poles[poles.imag > 1e-3 * np.abs(poles)]) / (2 * np.pi)
-    if not turning.size or turning.min() * measurement.duration_s >= CYCLES:
+    turning = modes_of(model.compile())
+    if not turning.size or turning.min() * measurement.duration_s >= CYCLES_ASKED:
         return None
     lowest = float(turning.min())
     return (
         f"The log holds {lowest * measurement.duration_s:.2g} cycles of the lowest mode ({lowest:.3g} Hz): record at "
-        f"least {CYCLES / lowest:.2g} s ({CYCLES:g} cycles)."
+        f"least {CYCLES_ASKED / lowest:.2g} s ({CYCLES_ASKED:g} cycles)."
     )
 
 
 def level_missing(measurement: Measurement, noise: NoiseFloor) -> str | None:
     """Ask for a higher level or averages when noise drowns the outputs, None when it doesn't."""
-    share = noise.rms / np.maximum(np.std(measurement.outputs, axis=1), np.finfo(np.float64).tiny)
+    share = noise.rms / np.maximum(np.std(measurement.outputs, axis=1), ZERO)
     middle = float(np.median(share))
     if middle <= LOUD:
         return None
     # What is measured holds the noise too.
-    signal = max(1.0 - middle**2, 0.01)
+    signal = max(1.0 - middle**2, LITTLE**2)
     factor = min(max(2.0, float(np.ceil(middle / (LOUD * signal**0.5)))), 4.0)
     then = middle / float(np.hypot(factor * signal**0.5, middle))
     return (
@@ -145,7 +137,7 @@ def _patterns(
     wanted = [site for name in names for site in every if site.name == name]
     wanted = wanted or [site for site in every if site.kind in ("joint", "body")]
     # Sites that even all these sensors see as one are one place.
-    sites = [place.sites[0] for place in placed(view, wanted, outputs, floor)][:_SITES]
+    sites = [place.sites[0] for place in placed(view, wanted, outputs, floor)][:LOCATED]
     if not sites:
         return np.zeros((0, len(rows), 1), dtype=np.complex128), []
     return printed_patterns(view, sites, outputs, floor), sites
@@ -169,7 +161,7 @@ def _lines(measurement: Measurement) -> RecordLines:
     low, high = excited_band_hz(measurement)
     step = measurement.sample_rate_hz / measurement.samples
     first, last = max(round(low / step), 1), min(round(high / step), (measurement.samples - 1) // 2)
-    index = np.unique(np.linspace(first, max(first, last), _LINES).round().astype(np.int64))
+    index = np.unique(np.linspace(first, max(first, last), LINES).round().astype(np.int64))
     return RecordLines(index=index, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from chladni.gap.calibration import ALONE, CLOSE, FORMS, PLACES, SOME
 from chladni.gap.comparison.scale_doubt import scale_doubt
 from chladni.gap.design.next_measurement import next_measurement
 from chladni.gap.design.what_is_missing import level_missing, sensor_missing, what_is_missing
@@ -11,10 +12,6 @@ from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.driven_part import driven_parts
 from chladni.signals.errors import ModelError
 
-#: Nats within which a further measurement is worth a thought.
-_STILL_CLOSE = 8.0
-#: Of the tuned model's error: parameters outside their tolerance that leave less are wrong, whatever else is.
-_MOSTLY = 0.25
 #: What "nothing is missing" leaves open in loud noise.
 _HIDDEN = "What moves the outputs by less than this noise may act unseen: this log can't rule it out."
 
@@ -59,7 +56,7 @@ def measure_next(study: Study, causes: Causes, seed: int) -> str | None:
     said = None
     if len(near) > 1 and near[0] is not causes.tuned:
         tunables = study.contest.run.tunables
-        said = next_measurement(study.model, study.measurement, tunables, near[:4], causes.noise, seed=seed)
+        said = next_measurement(study.model, study.measurement, tunables, near[:FORMS], causes.noise, seed=seed)
     return said or _beyond_these_sensors(study, causes)
 
 
@@ -76,13 +73,13 @@ def _still_close(causes: Causes) -> list[Contestant]:
         others = [one for one in causes.ranked if len(one.hypothesis.named) == count and one is not first]
         fewer = [one for one in causes.ranked if len(one.hypothesis.named) == count - 1][:1]
         alike = [first, *sorted((*others, *fewer), key=lambda one: -causes.belief.nats(one))]
-    enough = causes.belief.nats(first) - _STILL_CLOSE
+    enough = causes.belief.nats(first) - CLOSE
     return [one for one in alike if one is first or causes.belief.nats(one) > enough]
 
 
 def _likely_sites(study: Study, named: Sequence[str]) -> list[str]:
     """Sites that were named, then those at which an unknown force explains most."""
-    first = [located.places[0].sites for located in study.location.ranked[:3]]
+    first = [located.places[0].sites for located in study.location.ranked[:PLACES]]
     if len(study.measurement.output_names) == 1:
         # To an only sensor all are one place: it's among them that the force may act.
         sites = [site.name for each in first for site in each if site.kind in ("joint", "body")]
@@ -108,11 +105,11 @@ def _beyond_these_sensors(study: Study, causes: Causes) -> str | None:
 def _on_causes(study: Study, causes: Causes) -> str | None:
     if causes.within_step:
         return "The simulator's own step moves its outputs more than any effect does; shorten the step."
-    if causes.verdict == "unknown" and causes.best.hypothesis.freed and causes.best.gap < _MOSTLY * causes.tuned.gap:
+    if causes.verdict == "unknown" and causes.best.hypothesis.freed and causes.best.gap < SOME * causes.tuned.gap:
         return _wrong_first(study, causes)
     if causes.verdict == "unknown":
         return "No effect of the catalogue explains the gap; the site and the recovered force say where to look."
-    if causes.verdict == "none" and causes.tuned.chi > 1.2:
+    if causes.verdict == "none" and causes.tuned.chi > ALONE:
         return "What is left beside the noise is too little to be named."
     return None
 

@@ -8,7 +8,8 @@ from math import comb
 
 import numpy as np
 
-from chladni.gap.explanation.evidence import DETAILS, Left, doubt_of, highest_level, left_by_force
+from chladni.gap.calibration import ANOTHER, CLOSE, DETAILS, LAPSE, LEAST_SHARE, TEMPER
+from chladni.gap.explanation.evidence import Left, doubt_of, highest_level, left_by_force
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.location.locate import Located, Location
 from chladni.gap.location.profile import Profile
@@ -17,20 +18,6 @@ from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.effect_kind import EffectKind
-
-#: Prior odds of one more cause: machines lack one thing more often than two.
-ANOTHER = 0.1
-#: Share of the gap's power that a cause must have to be named: less is what a law, or the model, is rounded by.
-LEAST_SHARE = 0.02
-#: A name is given when it's more probable than not.
-NAMED = 0.5
-#: From nats to probabilities, by machines whose answers are known (see docs/methods/gap-explanation.md): so many nats
-#: count as one, for lines and sensors miss what a model lacks together; and how often all that was weighed is wrong.
-TEMPER, LAPSE = 5.0, 0.03
-#: Nats within which a log can't tell two candidates apart: odds of e^2 when they are printed.
-CLOSE = 2.0 * TEMPER
-#: Probability with which an answer set holds the truth.
-COVERAGE = 0.95
 
 Causes = frozenset[Candidate]
 

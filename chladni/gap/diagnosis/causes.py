@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from chladni.gap.diagnosis.belief import NAMED, Belief
+from chladni.gap.calibration import NAMED, SOME
+from chladni.gap.diagnosis.belief import Belief
 from chladni.gap.diagnosis.finer_floor import finer_floor
-from chladni.gap.diagnosis.own_signal import FOLLOWS, share_of_own_signal
+from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.plausible import is_lost
 from chladni.gap.diagnosis.search import Search
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
@@ -62,6 +63,12 @@ class Causes:
 
 def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
     """Search and judge; also give the study that the answer is of, over another floor or over windows."""
+    search = searched(study, progress)
+    return search.study, judged(search)
+
+
+def searched(study: Study, progress: Step) -> Search:
+    """Search over the floor that was estimated, over a finer one, and over windows where a run can't follow."""
     progress = _rising(progress)
     search = Search(study)
     search.run(_part(progress, 0.0, 0.7))
@@ -78,7 +85,7 @@ def causes_found(study: Study, progress: Step) -> tuple[Study, Causes]:
         windows.begin(_part(progress, 0.85, 1.0))
         search = windows if _verdict(windows.belief) == "effect" else search
     progress(1.0)
-    return search.study, _judged(search)
+    return search
 
 
 def _rising(progress: Step) -> Step:
@@ -104,7 +111,8 @@ def _parted(search: Search) -> bool:
     return unknown and lost and search.states is not None
 
 
-def _judged(search: Search) -> Causes:
+def judged(search: Search) -> Causes:
+    """Give the verdict on what was found."""
     study, belief, tuned, best = search.study, search.belief, search.nothing, search.best
     verdict = _verdict(belief)
     within_step = verdict == "effect" and _within_step(study, tuned, best)
@@ -149,4 +157,4 @@ def _verdict(belief: Belief) -> Verdict:
 def _distorted(study: Study, tuned: Contestant) -> tuple[str, ...]:
     simulated = tuned.fit.outputs[:, study.held]
     shares = share_of_own_signal(simulated, study.measurement.outputs[:, study.held] - simulated)
-    return tuple(name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > FOLLOWS)
+    return tuple(name for name, share in zip(study.measurement.output_names, shares, strict=True) if share > SOME)

@@ -6,14 +6,13 @@ from typing import Literal
 
 import numpy as np
 
+from chladni.gap.calibration import COVERAGE, DOUBT, DRAWS, LITTLE, ZERO
 from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.contest import held_gap
 from chladni.gap.records.diagnosis import Closing, HeldOut
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Mask, Real
-
-_DRAWS = 400
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +46,7 @@ class Yardstick:
     @property
     def doubt(self) -> float:
         """What the noise itself is uncertain by, which is no gap."""
-        return self.floor * (float(np.max(self.noise.std)) + 0.02)
+        return self.floor * (float(np.max(self.noise.std)) + DOUBT / 2)
 
     def closed(self, before: float, after: float) -> float | None:
         """Share of the gap that is closed, None when there is none beyond doubt."""
@@ -107,7 +106,7 @@ def closing_of(yardstick: Yardstick, before: Real, tuned: Real, after: Real, *, 
 def _interval(yardstick: Yardstick, before: Real, after: Real, seed: int) -> tuple[float, float] | None:
     """95 % interval by drawing held-out blocks with replacement (Kuensch 1989)."""
     measured = yardstick.measurement.outputs
-    size = np.maximum(np.mean(measured[:, yardstick.held] ** 2, axis=1, keepdims=True), 1e-300)
+    size = np.maximum(np.mean(measured[:, yardstick.held] ** 2, axis=1, keepdims=True), ZERO)
     blocks = [slice(start, stop) for start, stop in _runs(yardstick.held)]
     if len(blocks) < 3:
         return None
@@ -118,13 +117,13 @@ def _interval(yardstick: Yardstick, before: Real, after: Real, seed: int) -> tup
     lengths = np.array([(block.stop - block.start) * len(measured) for block in blocks])
     if not np.all(np.isfinite(powers)):
         return None
-    drawn = np.random.default_rng(seed).integers(0, len(blocks), (_DRAWS, len(blocks)))
+    drawn = np.random.default_rng(seed).integers(0, len(blocks), (DRAWS, len(blocks)))
     root = np.sqrt(powers[drawn].sum(axis=1) / lengths[drawn].sum(axis=1)[:, None])
     found = [yardstick.closed(float(one), float(other)) for one, other in root]
     shares = [one for one in found if one is not None]
-    if len(shares) < 0.9 * _DRAWS:
+    if len(shares) < (1 - LITTLE) * DRAWS:
         return None
-    low, high = np.quantile(shares, (0.025, 0.975))
+    low, high = np.quantile(shares, ((1 - COVERAGE) / 2, (1 + COVERAGE) / 2))
     return float(low), float(high)
 
 

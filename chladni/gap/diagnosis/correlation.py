@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from chladni.gap.calibration import ZERO
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.diagnosis import Correlation
 from chladni.gap.tuning.output_error import OutputErrorFit
@@ -22,7 +23,7 @@ def correlation_of(tunables: Tunables, fit: OutputErrorFit) -> Correlation | Non
     if not np.any(fit.parameter_std):
         return None
     covariance = fit.covariance[:count, :count]
-    std = np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))
+    std = np.sqrt(np.maximum(np.diag(covariance), ZERO))
     matrix = np.clip(covariance / std[:, None] / std, -1.0, 1.0)
     np.fill_diagonal(matrix, 1.0)
     return Correlation(names=tunables.names, matrix=matrix)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal
 
+from chladni.gap.calibration import COVERAGE
 from chladni.gap.comparison.distortion import distortion_where_told
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.periodicity import with_period
@@ -11,7 +12,6 @@ from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, re
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.diagnosis.advice import advice_on, measure_next
 from chladni.gap.diagnosis.any_law_beside import any_law
-from chladni.gap.diagnosis.belief import COVERAGE
 from chladni.gap.diagnosis.causes import Causes, causes_found
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.correlation import correlation_of

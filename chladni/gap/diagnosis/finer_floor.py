@@ -4,15 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from chladni.gap.calibration import ALONE, LESS
 from chladni.gap.comparison.noise_estimate import estimate_noise, smaller_floor
 from chladni.gap.diagnosis.own_signal import without_own_signal
-from chladni.gap.diagnosis.plausible import ALONE
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.noise_floor import NoiseFloor
-
-#: A floor that is lowered by less says the same.
-LOWER = 0.7
 
 
 def finer_floor(study: Study, best: Contestant) -> NoiseFloor | None:
@@ -32,6 +29,6 @@ def finer_floor(study: Study, best: Contestant) -> NoiseFloor | None:
         # Behind values alone nothing new is told, but where a sensor follows its own signal.
         return None
     finer = smaller_floor(noise, estimate_noise(replace(measurement, outputs=rest)))
-    lower = bool(np.any(finer.rms < LOWER * noise.rms))
+    lower = bool(np.any(finer.rms < LESS * noise.rms))
     more = bool(np.any(np.mean(left**2, axis=1) > ALONE * finer.rms**2))
     return finer if lower and more else None

@@ -5,15 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import FAR, FITS, PLACES
 from chladni.gap.diagnosis.study import Study, recovered_states
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.known_states import KnownStates
 from chladni.gap.explanation.shooting import Shooting, Shot
 from chladni.gap.location.locate import Located
-
-#: Named effects that leave so many times what unknown forces do may have lost the run; over short windows a law
-#: follows the log that leaves at most so many times that; most that go on from there, and hypotheses that are tried.
-_LOST, _FOLLOWING, _GROWN, _TRIED = 3.0, 3.0, 3, 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +40,7 @@ def least_force(located: Located | None) -> float:
 
 def is_lost_beside(located: Located | None, left: float) -> bool:
     """Whether what the best runs leave, over the noise's power, is far more than unknown forces do."""
-    return left > _LOST * least_force(located)
+    return left > FAR * least_force(located)
 
 
 def followed(study: Study, located: Located | None, hypotheses: Sequence[Hypothesis]) -> Entered | None:
@@ -60,12 +57,12 @@ def followed(study: Study, located: Located | None, hypotheses: Sequence[Hypothe
     if states is None:
         return None
     shooting = Shooting(study.contest, states)
-    following = _following(shooting, hypotheses, _FOLLOWING * least_force(located))
+    following = _following(shooting, hypotheses, FAR * least_force(located))
     entered = [shooting.entered(shot) for shot in following]
     return Entered(ranked=[one for one in entered if one is not None], states=states) if following else None
 
 
 def _following(shooting: Shooting, hypotheses: Sequence[Hypothesis], enough: float) -> list[Shot]:
     """Shoot the most promising hypotheses; those that explain nearly what unknown forces do, best first."""
-    shots = [shot for shot in map(shooting.shot, hypotheses[:_TRIED]) if shot is not None]
-    return sorted((one for one in shots if one.misfit < enough), key=lambda one: one.misfit)[:_GROWN]
+    shots = [shot for shot in map(shooting.shot, hypotheses[:FITS]) if shot is not None]
+    return sorted((one for one in shots if one.misfit < enough), key=lambda one: one.misfit)[:PLACES]

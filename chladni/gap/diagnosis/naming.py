@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.diagnosis.belief import CLOSE, NAMED
+from chladni.gap.calibration import CLOSE, NAMED, UNWEIGHED
 from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.hypothesis import Contestant
@@ -14,9 +14,6 @@ from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.models.files.site_units import compiled_site_units, known_site, units_at
 
-#: Of a floor that shakes and of a lattice: neither is a contest of likelihoods.
-_SHAKEN, _LATTICE = 0.9, 0.92
-
 
 def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
     """Give the causes that a verdict names; of several the one first that alone leaves least."""
@@ -24,7 +21,7 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
         return ()
     if causes.shaken is not None:
         shaken = causes.shaken
-        return (_plain(shaken.effect, "ground", _SHAKEN, group=shaken.group, numbers=shaken.parameters),)
+        return (_plain(shaken.effect, "ground", UNWEIGHED, group=shaken.group, numbers=shaken.parameters),)
     found: list[Cause] = []
     if causes.best is not causes.tuned:
         places = range(len(causes.best.hypothesis.named))
@@ -41,7 +38,10 @@ def _in_steps(study: Study, kind: EffectKind, taken: Collection[str]) -> list[Ca
     (name,) = kind.required
     return [
         _plain(
-            kind.name, site, _LATTICE, numbers={name: FittedNumber(value=one.step, std=None, unit=_unit(study, site))}
+            kind.name,
+            site,
+            UNWEIGHED,
+            numbers={name: FittedNumber(value=one.step, std=None, unit=_unit(study, site))},
         )
         for site, one in study.lattices.items()
         if site not in taken

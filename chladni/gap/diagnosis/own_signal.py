@@ -2,13 +2,9 @@
 
 import numpy as np
 
+from chladni.gap.calibration import LAW_POINTS, SOME
 from chladni.gap.explanation.hats import hats
 from chladni.signals.arrays import Real
-
-#: Points of the function. Of a few thousand samples of noise it explains a few per cent.
-_POINTS = 60
-#: A residual of which a curve explains more is no noise.
-FOLLOWS = 0.2
 
 
 def share_of_own_signal(simulated: Real, residual: Real) -> Real:
@@ -29,7 +25,7 @@ def share_of_own_signal(simulated: Real, residual: Real) -> Real:
     found = np.zeros(len(simulated))
     for row, (signal, left) in enumerate(zip(simulated, residual, strict=True)):
         plain = _power(_rest([np.ones_like(signal), signal], left))
-        found[row] = 1.0 - _power(_rest(hats(signal, _POINTS), left)) / plain if plain > 0 else 0.0
+        found[row] = 1.0 - _power(_rest(hats(signal, LAW_POINTS), left)) / plain if plain > 0 else 0.0
     return found
 
 
@@ -40,7 +36,7 @@ def without_own_signal(simulated: Real, residual: Real) -> Real:
     """
     shares = share_of_own_signal(simulated, residual)
     rows = zip(simulated, residual, shares, strict=True)
-    return np.stack([_rest(hats(signal, _POINTS), left) if share > FOLLOWS else left for signal, left, share in rows])
+    return np.stack([_rest(hats(signal, LAW_POINTS), left) if share > SOME else left for signal, left, share in rows])
 
 
 def _rest(functions: list[Real], target: Real) -> Real:

@@ -4,8 +4,9 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from chladni.gap.calibration import ALIKE, ALONE, BEGUN, CAUSES, FITS, FORMS, LEADS, PAIR_GAIN, PLACES, SAME
 from chladni.gap.diagnosis.following import Entered, followed, is_lost_beside
-from chladni.gap.diagnosis.plausible import ALONE, least_left, near_places, sound
+from chladni.gap.diagnosis.plausible import least_left, near_places, sound
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.candidates import Form, forms_at, promised, screened, searched
 from chladni.gap.explanation.degenerate import is_another
@@ -21,20 +22,6 @@ from chladni.models.core.model import Model
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-#: Fits of a second effect beside a first, and of each of two at once.
-_SECOND, _EACH = 4, 2
-#: Places at which a second effect is looked for; most of them, where others leave at most so many times what the best
-#: one does.
-_PLACES, _MOST_PLACES, _AS_GOOD = 4, 7, 1.1
-_TWO = 2
-#: Sensors at which two forces explain everything.
-_EXPLAINED = 2
-#: Linear words that are fitted beside the parameters behind a first effect.
-_LINEAR = 4
-#: Two forces, or where they'd explain anything two laws, must leave less than this of what one leaves; pairs that are
-#: as good as the best are screened too, so many, and those searched whose laws promise most.
-_PAIR_GAIN, _PAIR_TIE, _SCREENED, _PAIRS = 0.6, 1.3, 8, 3
 
 
 def second_causes(
@@ -55,11 +42,11 @@ def second_causes(
         return []
     model, location, known = behind
     trials = _second_trials(study, location, kept, known)
-    singles = [_beside(found, kept, one, found.fit.z) for one in effect_hypotheses(trials, count=_SECOND)]
+    singles = [_beside(found, kept, one, found.fit.z) for one in effect_hypotheses(trials, count=FORMS)]
     values = [_beside(found, kept, one, one.start_z) for one in wrong_values(location, study.contest.run.tunables)]
     good = sound(study, study.contest.enter_all([*singles, *values]))
     if least_left(good) > ALONE:
-        linear = linear_hypotheses(model, location, trials, count=_LINEAR)
+        linear = linear_hypotheses(model, location, trials, count=FORMS)
         good += sound(study, study.contest.enter_all([_beside(found, kept, one, one.start_z) for one in linear]))
     return good
 
@@ -68,7 +55,7 @@ def _second_trials(
     study: Study, location: Location, kept: Sequence[AttachedEffect], known: KnownEffect | None
 ) -> list[Screened]:
     """Screen the best places for a second effect, beside those that are kept."""
-    count = min(max(_PLACES, len(near_places(location, _AS_GOOD))), _MOST_PLACES)
+    count = min(max(FORMS, len(near_places(location, ALIKE))), FITS)
     trials = screened(location, location.ranked[:count], study.kinds, known)
     # At the same place a second word would mend the details of the first one's law; but a machine has many tones.
     taken = _same_places(study, {one.site for one in kept})
@@ -108,33 +95,33 @@ def paired_causes(study: Study, best: Contestant) -> Entered:
 
 def _two_forces(location: Location, pairs: Sequence[Located]) -> Located | None:
     """Give the pair that explains much more than one force does; any two explain two sensors."""
-    near = _near_pairs(location, pairs) if len(location.problem.measured) > _EXPLAINED else []
+    near = _near_pairs(location, pairs) if len(location.problem.measured) > 2 else []
     return near[0] if near else None
 
 
 def _weighed_pairs(study: Study, best: Contestant, pairs: Sequence[Located]) -> list[tuple[Located, list[Form]]]:
     """Give the pairs whose laws promise most while the other's force is free, with what was screened there."""
     location = study.location
-    tell = len(location.problem.measured) > _EXPLAINED
+    tell = len(location.problem.measured) > 2
     near = _near_pairs(location, pairs) if tell else list(pairs)
     weighed = [(pair, forms_at(location, [pair], study.kinds)) for pair in near]
     if not tell:
-        most = _PAIR_GAIN * best.chi * location.problem.scale
+        most = PAIR_GAIN * best.chi * location.problem.scale
         weighed = [one for one in weighed if promised(*one) < most]
-    return sorted(weighed, key=lambda one: promised(*one))[:_PAIRS]
+    return sorted(weighed, key=lambda one: promised(*one))[:PLACES]
 
 
 def _near_pairs(location: Location, pairs: Sequence[Located]) -> list[Located]:
     """Pairs of forces that explain much more than one, about as much as the best pair."""
-    if not pairs or pairs[0].profile.chi > _PAIR_GAIN * location.ranked[0].profile.chi:
+    if not pairs or pairs[0].profile.chi > PAIR_GAIN * location.ranked[0].profile.chi:
         return []
-    return [one for one in pairs if one.profile.chi < _PAIR_TIE * pairs[0].profile.chi][:_SCREENED]
+    return [one for one in pairs if one.profile.chi < SAME * pairs[0].profile.chi][:BEGUN]
 
 
 def exchanged(study: Study, both: Contestant) -> list[Contestant]:
     """Enter other effects beside each of two: the first was found while the second was not known."""
     effects = both.fit.effects
-    return [one for kept in effects if len(effects) == _TWO for one in second_causes(study, both, (kept,))]
+    return [one for kept in effects if len(effects) == CAUSES for one in second_causes(study, both, (kept,))]
 
 
 def without_one(study: Study, both: Contestant) -> list[Contestant]:
@@ -208,7 +195,7 @@ def _of_pair(pair: Located, weighed: Sequence[Form]) -> list[Hypothesis]:
     forms = []
     for place in pair.places:
         there = [one for one in found if one.trial.site.name in place.names]
-        forms.append(effect_hypotheses(there, count=_EACH))
+        forms.append(effect_hypotheses(there, count=LEADS))
     return [
         hypothesis_of((*first.effects, *second.effects), pair.profile.z) for first in forms[0] for second in forms[1]
     ]

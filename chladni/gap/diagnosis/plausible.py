@@ -4,23 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from chladni.gap.calibration import FAR, NEAR, ONE_FORCE, SAME
 from chladni.gap.diagnosis.following import is_lost_beside
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.degenerate import is_degenerate
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.location.locate import Located, Location
 from chladni.gap.side_by_side import side_by_side
-
-#: A first effect that leaves less than this, over the noise's power, is alone.
-ALONE = 1.3
-#: An unknown force that leaves less than this explains all; with more than so many sensors that says something. A
-#: place at which it leaves so many times more is another one.
-_ONE_FORCE, _PATTERN_SENSORS, _SAME_PLACE = 1.15, 2, 1.25
-#: What another place leaves of the gap beyond the best one, where the cause may still be: beside floors that shook
-#: the next place left 0.02, beside a stop between a body and the ground that joint 0.0001.
-_NEAR = 0.003
-#: Named effects that leave so many times what the best place does leave far more.
-_FAR = 3.0
 
 
 def is_one_force(location: Location) -> bool:
@@ -29,18 +19,18 @@ def is_one_force(location: Location) -> bool:
     Then two known ones elsewhere would only imitate it, and so would one.
     """
     best = location.best
-    return best is not None and len(location.problem.measured) > _PATTERN_SENSORS and best.profile.chi < _ONE_FORCE
+    return best is not None and len(location.problem.measured) > 2 and best.profile.chi < ONE_FORCE
 
 
 def plausible_places(location: Location) -> list[Located]:
     """Give the places at which the cause may be: all, unless one alone leaves nothing."""
-    return near_places(location, _SAME_PLACE) if is_one_force(location) else list(location.ranked)
+    return near_places(location, SAME) if is_one_force(location) else list(location.ranked)
 
 
 def near_places(location: Location, same: float) -> list[Located]:
     """Give the places that leave at most `same` times what the best one does, or little more of the gap."""
     first = _least_chi(location)
-    enough = max(same * first, first + _NEAR * (location.tuned.chi - first))
+    enough = max(same * first, first + NEAR * (location.tuned.chi - first))
     return [one for one in location.ranked if one.profile.chi < enough]
 
 
@@ -57,7 +47,7 @@ def is_lost(location: Location, left: float) -> bool:
 def is_far(location: Location, left: float) -> bool:
     """Whether runs leave far more than the best place does, a sensor's or an input's own as well as a force's."""
     best = location.best
-    return best is None or left > _FAR * max(best.profile.chi, 1.0)
+    return best is None or left > FAR * max(best.profile.chi, 1.0)
 
 
 def least_left(found: Sequence[Contestant]) -> float:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from chladni.gap.calibration import LISTED
 from chladni.gap.comparison.distortion import Distortion
 from chladni.gap.comparison.outside_band import products_outside
 from chladni.gap.comparison.shares import pooled_gap
@@ -14,9 +15,6 @@ from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.black_box import BlackBox
 from chladni.gap.records.measurement import Measurement
 from chladni.io.log_info import some_of
-
-#: Names of parameters in one sentence.
-_TOLD = 6
 
 
 def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Distortion | None) -> tuple[str, ...]:
@@ -67,7 +65,7 @@ def _of_black_box(study: Study, shown: Contestant) -> list[str]:
 
 def _undetermined(names: Sequence[str]) -> str:
     return (
-        f"this log doesn't determine {some_of(names, count=_TOLD)}: only the stated tolerance holds what it can't "
+        f"this log doesn't determine {some_of(names, count=LISTED)}: only the stated tolerance holds what it can't "
         "tell, which may have moved inside that with what it depends on"
     )
 

@@ -8,12 +8,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chladni.gap.calibration import (
+    BEGUN,
+    BEYOND_DOUBT,
+    CAUSES,
+    FITS,
+    FORMS,
+    ITERATIONS,
+    LEADS,
+    LITTLE,
+    MANY,
+    PLACES,
+    RIDGE,
+    WORTH,
+)
 from chladni.gap.diagnosis.belief import Belief
 from chladni.gap.diagnosis.following import followed
 from chladni.gap.diagnosis.pairs import exchanged, paired_causes, second_causes, shared, without_one
 from chladni.gap.diagnosis.plausible import is_lost, is_one_force, least_left, plausible_places, sound
 from chladni.gap.diagnosis.study import Study, contest_over, over_model
-from chladni.gap.diagnosis.told_holds import BEYOND_DOUBT, other_holds
+from chladni.gap.diagnosis.told_holds import other_holds
 from chladni.gap.explanation.any_law import left_by_any_law
 from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.hypotheses import (
@@ -34,22 +48,6 @@ if TYPE_CHECKING:
     from chladni.gap.explanation.known_states import KnownStates
 
 Step = Callable[[float], None]
-#: Fits of an effect, and so many more while all leave something: along a motion that isn't quite the machine's the
-#: screen may rank a law low that fits.
-_FITTED, _AGAIN = 7, 16
-#: First few forms whose details are fitted.
-_POLISHED = 4
-#: Leading sets behind which holds are asked for, and with which the search begins again beside another.
-_HOLD_LEADS, _AGAIN_FROM = 3, 8
-#: Nats that are worth another move: less pays for no name.
-WORTH = 12.0
-#: Share of what a loop leaves: a law of sixty numbers and more that leaves less has no need of a memory. Of two
-#: measured dampers with loops such laws left a fifth and two thirds, of a made joint with drag a hundredth.
-_HARDLY = 0.1
-#: Sensors that don't tell two forces from any others.
-_TOLD = 2
-#: Leads beside which another cause is looked for; most rounds of that; causes up to which two at once are.
-_LEADS, _MOST_CAUSES, _PAIRED = 2, 2, 2
 
 
 class Search:
@@ -107,8 +105,8 @@ class Search:
             there = ((each, where) for each in study.location.ranked for where in each.places[0].sites)
             at = next((found for found in there if found[1].name == site), None)
             self._left_without_memory[site] = 1.0 if at is None else left_by_any_law(study.location, *at)
-        gap = max(study.location.tuned.chi - 1.0, 1e-12)
-        return self._left_without_memory[site] < _HARDLY * (one.left.over_noise - 1.0) / gap
+        gap = max(study.location.tuned.chi - 1.0, RIDGE)
+        return self._left_without_memory[site] < LITTLE * (one.left.over_noise - 1.0) / gap
 
     def enter(self, hypotheses: Sequence[Hypothesis], progress: Step | None = None) -> bool:
         """Fit hypotheses and take them in, but for forms that were fitted before."""
@@ -165,7 +163,7 @@ class Search:
     def go_on(self, progress: Step) -> None:
         """Look for further causes, until nothing is left to be explained, or none helps."""
         progress(0.8)
-        for _ in range(_MOST_CAUSES):
+        for _ in range(CAUSES):
             if self._forces_end_it or not (self.is_open and self._one_more(progress)):
                 break
         self._settle()
@@ -182,9 +180,7 @@ class Search:
         if any(effect.kind.clues.several for lead in self._leads() for effect in lead.hypothesis.effects):
             # One place may have several of them.
             return False
-        return sensors > _TOLD and any(
-            len(one.places) < sensors and self.belief.elsewhere(one) < WORTH for one in tried
-        )
+        return sensors > 2 and any(len(one.places) < sensors and self.belief.elsewhere(one) < WORTH for one in tried)
 
     def _other_holds(self) -> bool:
         """Ask what inputs did between samples behind the leading causes, which may have hidden it; whether it's new.
@@ -192,7 +188,7 @@ class Search:
         What acts at an input itself could be any hold as far as an unknown force there tells.
         """
         study = self.study
-        leads = [one.best for one in self.belief.sets if one.causes][:_HOLD_LEADS]
+        leads = [one.best for one in self.belief.sets if one.causes][:PLACES]
         model, nats = study.model, max((one.log_evidence for one in leads), default=0.0)
         for others in other_holds(study.model, study.measurement):
             for other in [model.with_holds(one) for one in others]:
@@ -202,7 +198,7 @@ class Search:
                     model, nats = other, told
         if model is study.model:
             return False
-        begun = [_from_fit(one.best) for one in self.belief.sets[:_AGAIN_FROM] if one.causes]
+        begun = [_from_fit(one.best) for one in self.belief.sets[:BEGUN] if one.causes]
         study, self._tried = over_model(study, model), set()
         self.begin_anew(study, [_without_cause(study)])
         self.enter(begun)
@@ -217,7 +213,7 @@ class Search:
     def _several_act(self) -> bool:
         """Whether a force at the best place leaves what only another one explains."""
         best, sensors = self.study.location.best, len(self.study.measurement.output_names)
-        return best is not None and sensors > _TOLD and self.belief.elsewhere(best) > WORTH
+        return best is not None and sensors > 2 and self.belief.elsewhere(best) > WORTH
 
     def _two_at_once(self) -> None:
         pairs = paired_causes(self.study, self.best)
@@ -236,7 +232,7 @@ class Search:
             places += self._beside_wrong_values()
         candidates = screened(location, places, study.kinds)
         progress(0.3)
-        hypotheses = effect_hypotheses(candidates, count=_FITTED)
+        hypotheses = effect_hypotheses(candidates, count=FITS)
         values = wrong_values(location, study.contest.run.tunables)
         self.enter([*hypotheses, *values], lambda done: progress(0.3 + 0.4 * done))
         return candidates, hypotheses
@@ -246,7 +242,7 @@ class Search:
         study, location = self.study, self.study.location
         self.enter(linear_hypotheses(study.model, location, candidates))
         if self.is_open:
-            self.enter(_others(effect_hypotheses(candidates, count=_AGAIN), hypotheses))
+            self.enter(_others(effect_hypotheses(candidates, count=MANY), hypotheses))
         if self.is_open and is_lost(location, self._least):
             self.enter(sticking_hypotheses(location, study.kinds))
         if self.is_open and is_lost(location, self._least):
@@ -259,7 +255,7 @@ class Search:
         """The leading places with the values that are wrong beside a force there."""
         study = self.study
         tunables = study.contest.run.tunables
-        leading = study.location.ranked[:_LEADS] if len(study.measurement.output_names) > 1 else ()
+        leading = study.location.ranked[:LEADS] if len(study.measurement.output_names) > 1 else ()
         found = [with_wrong_values(study.location, one, tunables) for one in leading]
         return [one for one in found if one is not None]
 
@@ -271,7 +267,7 @@ class Search:
             if self.is_open:
                 self.add(second_causes(study, lead))
         progress(0.86)
-        if self.is_open and not self._several_act() and len(before.hypothesis.effects) < _PAIRED:
+        if self.is_open and not self._several_act() and len(before.hypothesis.effects) < CAUSES:
             self._two_at_once()
         progress(0.94)
         if self.best is before:
@@ -310,7 +306,7 @@ class Search:
         for one in self.belief.sets:
             if one.causes:
                 leads.setdefault(frozenset(effect.site for effect in one.best.hypothesis.effects), one.best)
-        return list(leads.values())[:_LEADS]
+        return list(leads.values())[:LEADS]
 
     @property
     def _least(self) -> float:
@@ -320,7 +316,7 @@ class Search:
 def _without_cause(study: Study) -> Contestant:
     """Give the tuned model alone."""
     contest = study.contest
-    found = contest.enter(Hypothesis(start_z=study.location.tuned.z), max_iterations=20)
+    found = contest.enter(Hypothesis(start_z=study.location.tuned.z), max_iterations=2 * ITERATIONS)
     if found is None:
         # Too sensitive to be fitted in free run: what the linear part said of the parameters has to do.
         found = contest.enter(Hypothesis(start_z=study.location.tuned.z), tune=False)
@@ -349,7 +345,7 @@ def best_forms(ranked: Sequence[Contestant]) -> list[Contestant]:
     for one in ranked:
         key = (one.hypothesis.named, tuple(effect.variant for effect in one.hypothesis.effects))
         forms.setdefault(key, one)
-    return list(forms.values())[:_POLISHED]
+    return list(forms.values())[:FORMS]
 
 
 def _polished(study: Study, found: Contestant) -> list[Contestant]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from chladni.gap.calibration import ALIKE, CLEARLY, LEFT_BY_LAW, MOST, SOME, TIED
 from chladni.gap.diagnosis.plausible import near_places
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_law import left_by_any_law
@@ -15,15 +16,8 @@ from chladni.gap.plant.places import Site
 from chladni.gap.records.diagnosis import FittedNumber
 from chladni.signals.arrays import Real
 
-#: How well the ground must explain, how nearly as well as the best place; and where another can't be told from it.
-_CHI, _BEST, _TIED = 1.5, 1.02, 1.1
-#: Most places that may be as good: the ground and the one joint on which a machine stands. Where forces inside the
-#: machine do as well, the sensors don't tell where it is moved.
-_ALIKE = 2
-#: Share of the gap that any law of a site's motion, or a filter of the inputs, must leave there. Of a floor that
-#: shook the best law at a joint left 0.2 to 0.5 in made machines, of an effect at that joint at most 0.12; at an
-#: input 0.34 against 0.08.
-_LEFT = {"joint": 0.15, "input": 0.2, "ground": 0.5}
+#: Share of the gap that any law of a site's motion, or a filter of the inputs, must leave there.
+_LEFT = {"joint": LEFT_BY_LAW, "input": SOME, "ground": MOST}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,18 +50,18 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
     if kind is None or len(study.measurement.output_names) < 2:
         return None
     first = study.location.ranked[0].profile.chi
-    tied = [one for one in study.location.ranked if one.profile.chi < _TIED * first]
-    if len(tied) > _ALIKE:
+    tied = [one for one in study.location.ranked if one.profile.chi < ALIKE * first]
+    if len(tied) > 2:
         return None
     ground = next((one for one in tied if _has_ground(one)), None)
-    if ground is None or ground.profile.chi > min(_CHI, _BEST * first):
+    if ground is None or ground.profile.chi > min(CLEARLY, TIED * first):
         return None
     predicted = predicted_by_others(study.location.problem, ground.profile)
     measured = study.measurement.outputs
     by_others, alone = (held_gap(measured, one, study.held) for one in (predicted, tuned.fit.outputs))
     if not by_others < alone:
         return None
-    if any(_follows(study, one) for one in near_places(study.location, _TIED)):
+    if any(_follows(study, one) for one in near_places(study.location, ALIKE)):
         return None
     site = _grounds(ground)[0]
     parameters = floor_motion(study.location.problem, site, ground.profile.z, kind)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.gap.calibration import FAR, HARDLY_ANY, MOST, STEP
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.quiet_floor import quiet_floor
@@ -31,12 +32,8 @@ from chladni.signals.errors import EstimateError, ModelError
 from chladni.signals.sensor_quality import sensor_quality
 from chladni.signals.time_series import TimeSeries
 
-#: Misfit over noise with which a record is followed from its start to its end.
-_FOLLOWS = 3.0
-#: Most e-folds that an error may grow by from one sample to the next: every window begins with one.
-_E_FOLDS = 10.0
-#: Different values that are repeated, over all samples, of a sensor that holds them.
-_HELD = 0.05
+#: Most e-folds that an error may grow by from one sample to the next, before a step of differences is all there is.
+_E_FOLDS = -float(np.log(STEP))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -199,8 +196,8 @@ def _require_within_reach(model: Model, measurement: Measurement) -> None:
     growth = float(np.linalg.eigvals(model.compile().a).real.max(initial=0.0))
     if growth > _E_FOLDS * measurement.sample_rate_hz:
         raise EstimateError(
-            f"model {model.name!r} runs away: an error grows e-fold in {1.0 / growth:.2g} s, {_E_FOLDS:g} times and "
-            f"more between two samples of log {measurement.log!r} ({measurement.sample_rate_hz:g} Hz); check the "
+            f"model {model.name!r} runs away: an error grows e-fold in {1.0 / growth:.2g} s, {_E_FOLDS:.3g} times "
+            f"and more between two samples of log {measurement.log!r} ({measurement.sample_rate_hz:g} Hz); check the "
             "gains and signs of its loops, and the units of its parameters"
         )
 
@@ -217,7 +214,7 @@ def _runs_free(model: Model, location: Location) -> bool:
     best = location.best
     if growing > 1.0 or best is None or len(location.problem.measured) < 2:
         return False
-    return min(best.profile.chi, location.tuned.chi) < _FOLLOWS
+    return min(best.profile.chi, location.tuned.chi) < FAR
 
 
 def _stepping(kinds: Iterable[EffectKind]) -> EffectKind | None:
@@ -232,7 +229,7 @@ def _lattices(measurement: Measurement, noise: NoiseFloor, stepping: EffectKind 
     for name, signal, rms in zip(measurement.output_names, measurement.outputs, noise.rms, strict=True):
         lattice = lattice_of(signal)
         # Steps far below the noise are those of any converter.
-        if lattice is not None and lattice.rounding_rms > 0.5 * rms:
+        if lattice is not None and lattice.rounding_rms > MOST * rms:
             found[name] = lattice
     return found
 
@@ -243,7 +240,7 @@ def _repeating(measurement: Measurement) -> tuple[str, ...]:
     Of a rest, a range's end or a lattice the values that repeat would be few.
     """
     names, outputs = measurement.output_names, measurement.outputs
-    often = {name for name, row in zip(names, outputs, strict=True) if _values_held(row) > _HELD * row.size}
+    often = {name for name, row in zip(names, outputs, strict=True) if _values_held(row) > HARDLY_ANY * row.size}
     channels = tuple(
         Channel(name=name, unit=unit) for name, unit in zip(names, measurement.output_units, strict=True)
     )

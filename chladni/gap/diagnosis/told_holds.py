@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from chladni.gap.calibration import BEYOND_DOUBT, PLACES, PROFILE_STEPS
 from chladni.gap.explanation.evidence import Left, highest_level, left_by_force
 from chladni.gap.location.locate import Location
 from chladni.gap.location.profile import profiled
@@ -9,11 +10,6 @@ from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.model import Model
 from chladni.models.core.port import HOLDS, HoldKind
-
-#: Nats by which a hold must lead: odds of 1000 to one, since all that follows stands on it.
-BEYOND_DOUBT = float(np.log(1000.0))
-#: Leading places at which an unknown force may act meanwhile.
-_PLACES = 3
 
 
 def with_told_holds(model: Model, location: Location) -> Model:
@@ -64,11 +60,11 @@ def _weighed(model: Model, location: Location) -> tuple[float, float]:
     old = location.problem
     level = highest_level(old.noise)
     problem = LinearProblem(model, old.measurement, old.noise, old.tunables, old.lines)
-    tuned = profiled(problem, (), location.tuned.z, iterations=4)
+    tuned = profiled(problem, (), location.tuned.z, iterations=PROFILE_STEPS // 2)
     plain = Left(along=0.0, along_expected=0.0, across=tuned.misfit, across_expected=tuned.expected, force=0.0)
     found = [(plain.log_likelihood(level) - tuned.prior / 2, plain.elsewhere(level))]
-    for one in location.ranked[:_PLACES] if len(problem.measured) > 1 else ():
-        beside = profiled(problem, (one.places[0].sites[0],), one.profile.z, iterations=4)
+    for one in location.ranked[:PLACES] if len(problem.measured) > 1 else ():
+        beside = profiled(problem, (one.places[0].sites[0],), one.profile.z, iterations=PROFILE_STEPS // 2)
         left = left_by_force(problem, tuned, beside)
         found.append((left.log_likelihood(level) - beside.prior / 2, left.elsewhere(level)))
     return max(found)

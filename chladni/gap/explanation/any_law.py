@@ -1,10 +1,12 @@
 """Whether a gap follows what moves at a site, by any law at all: no name is asked for."""
 
 from collections.abc import Iterator
+from math import sqrt
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from chladni.gap.calibration import FILTER_SAMPLES, LAW_POINTS, LINES_APART, PACE_POINTS, RIDGE, TONE_LINES, ZERO
 from chladni.gap.explanation.followed import followed
 from chladni.gap.explanation.hats import hats
 from chladni.gap.explanation.screen import Screen
@@ -16,10 +18,8 @@ from chladni.gap.plant.places import Site
 from chladni.models.effects.trial import Force, Trial
 from chladni.signals.arrays import Real
 
-#: Points of a law of the way, and of one of the pace beside it; of a law of both along each; samples of a filter.
-_WAY, _PACE, _BOTH, _FILTER = 60, 16, 8, 24
-#: Lines that a tone must stand out of; the first that is one and no drift.
-_NEIGHBOURS, _FIRST = 201, 3
+#: Points of a law of both along each: as many numbers as one of the way alone.
+_BOTH_POINTS = round(sqrt(LAW_POINTS))
 
 
 def left_by_any_law(location: Location, located: Located, site: Site) -> float:
@@ -37,7 +37,7 @@ def left_by_any_law(location: Location, located: Located, site: Site) -> float:
     problem = location.problem
     motion = recovered(problem, located.profile, site)
     screen = Screen(problem, located.profile, site)
-    gap = max(location.tuned.chi - 1.0, 1e-12)
+    gap = max(location.tuned.chi - 1.0, RIDGE)
     left = [1.0]
     for force in _forces(problem, motion):
         start = screen.weigh(_trial(site, force), ())
@@ -50,19 +50,19 @@ def left_by_any_law(location: Location, located: Located, site: Site) -> float:
 def _forces(problem: LinearProblem, motion: Recovered) -> Iterator[Force]:
     way, pace = motion.displacement, motion.velocity
     if motion.site.kind == "joint":
-        yield _force(motion, [*hats(way, _WAY), *hats(pace, _PACE)])
+        yield _force(motion, [*hats(way, LAW_POINTS), *hats(pace, PACE_POINTS)])
         yield _force(motion, _both(way, pace))
         yield _force(motion, [way * tone for tone in _tones(motion)])
         return
-    delayed = [np.roll(row, late) for row in problem.measurement.inputs for late in range(_FILTER)]
+    delayed = [np.roll(row, late) for row in problem.measurement.inputs for late in range(FILTER_SAMPLES)]
     if motion.site.kind == "input":
         # A limit of slew follows the command's way and pace.
-        delayed += [*hats(way, _PACE), *_both(way, np.gradient(way))]
+        delayed += [*hats(way, PACE_POINTS), *_both(way, np.gradient(way))]
     yield _force(motion, delayed)
 
 
 def _both(way: Real, pace: Real) -> list[Real]:
-    return [one * other for one in hats(way, _BOTH) for other in hats(pace, _BOTH)]
+    return [one * other for one in hats(way, _BOTH_POINTS) for other in hats(pace, _BOTH_POINTS)]
 
 
 def _tones(motion: Recovered) -> list[Real]:
@@ -71,11 +71,11 @@ def _tones(motion: Recovered) -> list[Real]:
     product = motion.force * motion.displacement
     power = np.abs(np.fft.rfft((product - product.mean()) * np.hanning(count))) ** 2
     # A running sum forgets what is far below the largest line, and leaves its rounding there.
-    least = np.finfo(np.float64).eps * power.max() + np.finfo(np.float64).tiny
-    above = power / np.maximum(uniform_filter1d(power, _NEIGHBOURS, mode="reflect"), least)
-    line = int(np.argmax(above[_FIRST:-1])) + _FIRST
+    least = np.finfo(np.float64).eps * power.max() + ZERO
+    above = power / np.maximum(uniform_filter1d(power, TONE_LINES, mode="reflect"), least)
+    line = int(np.argmax(above[LINES_APART:-1])) + LINES_APART
     # Between lines by a parabola through the logarithms: over hundreds of turns a line's width is too much.
-    below, at, beyond = np.log(np.maximum(power[line - 1 : line + 2], np.finfo(np.float64).tiny))
+    below, at, beyond = np.log(np.maximum(power[line - 1 : line + 2], ZERO))
     bend = below - 2.0 * at + beyond
     turns = line + (0.5 * (below - beyond) / bend if bend < 0 else 0.0)
     angle = 2.0 * np.pi * turns * np.arange(count) / count

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from chladni.gap.calibration import FAR, HOPELESS, MANY, PLACES
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.followed import followed
 from chladni.gap.explanation.known_effect import KnownEffect
@@ -14,11 +15,6 @@ from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.places import Site
 from chladni.gap.side_by_side import side_by_side
 from chladni.models.effects.effect_kind import EffectKind
-
-#: Screened forms that are searched beyond their grid: of all, and of each site.
-_REFINED, _REFINED_EACH = 16, 3
-#: Misfit over the best form's beyond which a form is not searched; over the best place's up to which a place is.
-_HOPELESS, _PLAUSIBLE = 100.0, 3.0
 
 #: A form of a law, and the screen that weighed it.
 Form = tuple[Screened, Screen]
@@ -46,7 +42,7 @@ def screened(
 def searched(places: Sequence[Located], forms: Sequence[Form]) -> list[Screened]:
     """Search the most promising of the forms at some places beyond their grid; the best of each, by rising cost."""
     found = sorted(forms, key=lambda one: one[0].cost)
-    enough = _PLAUSIBLE * min((one.profile.chi for one in places), default=0.0)
+    enough = FAR * min((one.profile.chi for one in places), default=0.0)
     plausible = {site for one in places if one.profile.chi < enough for site, _ in sites_at(one)}
     best: dict[tuple[str, str, str | None, str | None], Form] = {}
     for one, screen in found:
@@ -101,7 +97,7 @@ def _worth_a_search(found: Sequence[Screened], plausible: set[Site]) -> set[int]
 
     A grid may step over a law that is sharp in its numbers; where an unknown force explains most, it's looked for.
     """
-    worth = {place for place, one in enumerate(found[:_REFINED]) if one.misfit < _HOPELESS * found[0].misfit}
+    worth = {place for place, one in enumerate(found[:MANY]) if one.misfit < HOPELESS * found[0].misfit}
     for site in plausible:
-        worth.update([place for place, one in enumerate(found) if one.trial.site == site][:_REFINED_EACH])
+        worth.update([place for place, one in enumerate(found) if one.trial.site == site][:PLACES])
     return worth

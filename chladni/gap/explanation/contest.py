@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chladni.gap.calibration import BLOCK_S, EFFECTIVE_SAMPLES, FEWEST, ITERATIONS, THIRDS
 from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.evidence import Left, doubt_of, freedom_nats, left_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
@@ -21,27 +22,18 @@ from chladni.signals.errors import EstimateError, ModelError
 if TYPE_CHECKING:
     from chladni.gap.records.noise_floor import NoiseFloor
 
-#: Independent samples that a log is taken for, whatever its length: a model that is right but for details of its law
-#: must not be refuted by those details a million times over (see docs/methods/gap-explanation.md).
-EFFECTIVE_SAMPLES = 200.0
-#: Least of them that tell a state at the start of a window.
-_LEAST_SAMPLES = 2.0
-_BLOCK_S = 0.75
-#: Every so manieth block is held out.
-_EVERY = 3
-
 
 def training_mask(samples: int, sample_rate_hz: float, period_samples: int | None = None) -> Mask:
     """Give ``[sample]``: True where fits may look, False in every third block of about 0.75 s.
 
     Blocks alternate over the whole log, so that a drift is on both sides; they don't keep step with a period.
     """
-    block = max(int(_BLOCK_S * sample_rate_hz), samples // 200, 1)
+    block = max(int(BLOCK_S * sample_rate_hz), samples // EFFECTIVE_SAMPLES, 1)
     # At least four held-out blocks, or a bootstrap has nothing to draw from.
-    block = min(block, max(samples // (4 * _EVERY), 1))
-    if period_samples is not None and period_samples % (_EVERY * block) < block:
+    block = min(block, max(samples // (FEWEST * THIRDS), 1))
+    if period_samples is not None and period_samples % (THIRDS * block) < block:
         block += max(block // 7, 1)
-    return np.asarray((np.arange(samples) // block) % _EVERY != 1, dtype=np.bool_)
+    return np.asarray((np.arange(samples) // block) % THIRDS != 1, dtype=np.bool_)
 
 
 class Contest:
@@ -71,7 +63,7 @@ class Contest:
         self,
         hypothesis: Hypothesis,
         *,
-        max_iterations: int = 12,
+        max_iterations: int = ITERATIONS,
         tune: bool = True,
         initial: Real | None = None,
     ) -> Contestant | None:
@@ -153,14 +145,14 @@ class Contest:
         """
         windows = len(self.run.windows)
         added = max(fit.initial.shape[-1] - len(self.run.compiled().states), 0) * (windows - 1)
-        return float(0.5 * added * np.log(max(EFFECTIVE_SAMPLES / windows, _LEAST_SAMPLES)))
+        return float(0.5 * added * np.log(max(EFFECTIVE_SAMPLES / windows, 2.0)))
 
     def enter_all(
         self,
         hypotheses: Sequence[Hypothesis],
         progress: Callable[[float], None] | None = None,
         *,
-        max_iterations: int = 12,
+        max_iterations: int = ITERATIONS,
     ) -> list[Contestant]:
         """Fit hypotheses, and give them in their order; those that diverge are left out."""
         enter = partial(self.enter, max_iterations=max_iterations)

@@ -5,29 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import DETAILS, DOUBT, ELSEWHERE, OPEN, SIGMAS, SIZE, SLIP, UNUSUAL, USUAL, ZERO
 from chladni.gap.location.profile import Elimination, Profile
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.linear_view import View
 from chladni.gap.plant.places import sites_of, way_to
-from chladni.gap.plant.tunable import SLIP
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.effect_scale import effect_numbers
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.signals.arrays import Complex, Real
-
-#: Independent numbers that what a law differs from the machine's by is worth, along its own force and elsewhere.
-DETAILS, ELSEWHERE = 8.0, 60.0
-#: Share of its force, as RMS, that a right law leaves at most, usually; and numbers that what goes beyond is worth.
-USUAL, UNUSUAL = 1.0 / 6.0, 20.0
-#: The same from which on another word may do better: looking costs no name.
-_OPEN = 0.1
-#: Of a floor's power: what it is uncertain by beyond its degrees of freedom (bias of a local fit, drift of a sensor).
-DOUBT = 0.05
-#: Doubts of a floor within which what is left may be noise alone.
-_SIGMAS = 2.0
-#: e-folds: one sigma of an effect's number before a log is seen.
-SIZE = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +52,7 @@ class Left:
     def details(self) -> float:
         """Share of the laws' force, as RMS, that the laws leave beyond noise; 0 without such laws."""
         beyond = max(self.along - self.along_expected, 0.0)
-        return float(np.sqrt(beyond / max(self.force - self.along_expected, beyond, 1e-300)))
+        return float(np.sqrt(beyond / max(self.force - self.along_expected, beyond, ZERO)))
 
     def beyond(self, level: float = 1.0) -> float:
         """Energy beyond the noise."""
@@ -89,7 +76,7 @@ class Left:
         """Nats of what neither noise, wrong as the floor may be, nor usual details of the laws account for."""
         noise = level * self.along_expected
         # Where no force without the laws is known, of windows, no detail is usual.
-        usual = self._usual(_OPEN) if np.isfinite(self.force) else 0.0
+        usual = self._usual(OPEN) if np.isfinite(self.force) else 0.0
         surplus = _beyond_doubt(self.along - noise - usual, self.doubt * noise)
         return self.elsewhere(level) + _student(surplus, UNUSUAL, usual)
 
@@ -145,7 +132,7 @@ def _beyond_doubt(beyond: float, doubted: float) -> float:
 
 def highest_level(noise: NoiseFloor) -> float:
     """Share of a floor that the noise has at most: two doubts more."""
-    return 1.0 + _SIGMAS * doubt_of(noise)
+    return 1.0 + SIGMAS * doubt_of(noise)
 
 
 def doubt_of(noise: NoiseFloor) -> float:
@@ -229,4 +216,4 @@ def freedom_nats(
     flat += [across if fit.effects[one.effect].kind.clues.exact else along for one in effects]
     before = np.concatenate([SLIP / tunables.tolerance[places], np.full(len(effects), SIZE)]) / np.sqrt(flat)
     over = fit.covariance[np.ix_(chosen, chosen)] / before / before[:, None]
-    return float(0.5 * np.sum(np.log(np.clip(np.linalg.eigvalsh(over), 1e-300, 1.0))))
+    return float(0.5 * np.sum(np.log(np.clip(np.linalg.eigvalsh(over), ZERO, 1.0))))

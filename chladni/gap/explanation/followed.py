@@ -4,19 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from chladni.gap.calibration import GAINED, PROFILE_STEPS, SHORTER
 from chladni.gap.explanation.held_site import HeldSite
 from chladni.gap.explanation.screen import Screen, Screened
 from chladni.gap.location.profile import Profile
 from chladni.signals.arrays import Real
 
-#: Parts of a step that are tried until one makes the misfit less.
-_SHARES = (1.0, 0.3, 0.09)
-#: A step that gains less than this share of the cost is the last.
-_TOLD = 0.01
 _Followed = tuple[Screened, Profile]
 
 
-def followed(screen: Screen, start: Screened, *, iterations: int = 6) -> tuple[Screened, Screen] | None:
+def followed(screen: Screen, start: Screened, *, iterations: int = PROFILE_STEPS) -> tuple[Screened, Screen] | None:
     """Follow a trial by Gauss and Newton steps in the parameters; also give the screen where it ends.
 
     A free force hides what parameters should do: those of its place may lie many widths of a resonance from the right
@@ -40,7 +37,7 @@ def followed(screen: Screen, start: Screened, *, iterations: int = 6) -> tuple[S
             break
         gained, best = best[0].cost - found[0].cost, found
         there = _at(screen, best)
-        if gained < _TOLD * best[0].cost:
+        if gained < GAINED * best[0].cost:
             break
     return best[0], there
 
@@ -63,7 +60,7 @@ def _held(screen: Screen, start: Screened, z: Real) -> _Followed | None:
 
 def _searched(screen: Screen, start: Screened, best: _Followed, step: Real) -> _Followed | None:
     """First part of a step that makes the cost less."""
-    for share in _SHARES:
+    for share in (SHORTER**tried for tried in range(3)):
         found = _held(screen, start, best[0].z + share * step)
         if found is not None and found[0].cost < best[0].cost:
             return found

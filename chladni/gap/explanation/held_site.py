@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from chladni.gap.calibration import RANK
 from chladni.gap.location.profile import Elimination, Profile
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
@@ -49,7 +50,7 @@ class HeldSite:
         basis = self.printed(force.basis)
         size = np.linalg.norm(basis, axis=1)
         size[size == 0] = 1.0
-        found = np.linalg.lstsq((basis / size[:, None]).T, self.unexplained(force), rcond=1e-10)[0]
+        found = np.linalg.lstsq((basis / size[:, None]).T, self.unexplained(force), rcond=RANK)[0]
         return np.asarray(found / size, dtype=np.float64)
 
     def with_force(self, force: Force, amplitudes: Real) -> Profile:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from chladni.gap.calibration import LEADS, LITTLE, TIED, UNLIKELY
 from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.screen import Screened
@@ -17,13 +18,8 @@ from chladni.models.effects.clues import FittedForm
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-#: Misfit over another's up to which a screened form is as good, and how many of those are tried too.
-_TIED, _TIES = 1.02, 2
-#: Of the numbers that make an effect larger, what it begins with where something else may do a part of it.
-_LITTLE = 0.1
 
-
-def effect_hypotheses(screened: Sequence[Screened], *, count: int, margin: float = 40.0) -> list[Hypothesis]:
+def effect_hypotheses(screened: Sequence[Screened], *, count: int, margin: float = UNLIKELY) -> list[Hypothesis]:
     """Give the best screened trials as hypotheses.
 
     Parameters
@@ -40,9 +36,9 @@ def effect_hypotheses(screened: Sequence[Screened], *, count: int, margin: float
     enough, last = margin * min(one.chi for one in screened), 0.0
     for one in screened:
         key = (one.trial.effect, one.trial.site.name)
-        if seen.get(key, 0) >= 2 or one.chi > enough:
+        if seen.get(key, 0) >= LEADS or one.chi > enough:
             continue
-        if len(found) >= count and (one.chi > _TIED * last or len(found) >= count + _TIES):
+        if len(found) >= count and (one.chi > TIED * last or len(found) >= count + LEADS):
             break
         effect = effect_of(one)
         if effect is None:
@@ -76,7 +72,7 @@ def effect_of(one: Screened) -> AttachedEffect | None:
 def little_of(effect: AttachedEffect, site: str) -> AttachedEffect:
     """Give a tenth of an effect at a site: where it isn't known yet how much of it acts there."""
     sizes = effect.kind.clues.sizes
-    values = {name: (_LITTLE if name in sizes else 1.0) * one for name, one in effect.values.items()}
+    values = {name: (LITTLE if name in sizes else 1.0) * one for name, one in effect.values.items()}
     return replace(effect, site=site, values=values)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.gap.calibration import FAR, FORMS, LOCATED, ROUNDING, WIDE
 from chladni.gap.explanation.hypotheses import effect_of, hypothesis_of
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.explanation.screen import Screened
@@ -20,16 +21,6 @@ from chladni.models.core.model import Model
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-#: Misfit over the best place's up to which a place is looked at.
-_PLAUSIBLE = 3.0
-#: Of the fitted ones the best that enter the contest.
-_ENTERED = 4
-#: Factors on a frequency where its search begins too: what swings above half the rate shows folded down.
-_OCTAVES = (0.5, 1.0, 2.0)
-#: Of an effect's number in a fit's own units (e-folds of what is positive): so that its prior is none.
-_STEP = 3.0
-_UNBOUNDED = 1e3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +43,7 @@ class LinearFit:
 
 
 def linear_hypotheses(
-    model: Model, location: Location, screened: Sequence[Screened], *, count: int = 10
+    model: Model, location: Location, screened: Sequence[Screened], *, count: int = 2 * LOCATED
 ) -> list[Hypothesis]:
     """Fit the linear effects of a screen together with the parameters; the best, by rising misfit.
 
@@ -69,13 +60,13 @@ def linear_hypotheses(
     """
     if isinstance(model, BlackBox):
         return []
-    enough = _PLAUSIBLE * min((one.profile.chi for one in location.ranked), default=0.0)
+    enough = FAR * min((one.profile.chi for one in location.ranked), default=0.0)
     there = {site.name: one for one in location.ranked if one.profile.chi < enough for site in one.places[0].sites}
     worth = [one for one in screened if one.trial.site.name in there]
     effects = [effect for one in worth if (effect := effect_of(one)) is not None and effect.kind.linear]
     found = [fitted_beside(model, location, effect, there[effect.site].profile.z) for effect in effects[:count]]
     ranked = sorted((one for one in found if one is not None), key=lambda one: one.chi)
-    return [hypothesis_of((one.effect,), one.z, screened=one.chi) for one in ranked[:_ENTERED]]
+    return [hypothesis_of((one.effect,), one.z, screened=one.chi) for one in ranked[:FORMS]]
 
 
 def _starts(effect: AttachedEffect) -> list[AttachedEffect]:
@@ -83,20 +74,20 @@ def _starts(effect: AttachedEffect) -> list[AttachedEffect]:
         return [effect]
     return [
         replace(effect, values={**effect.values, "frequency": factor * effect.values["frequency"]})
-        for factor in _OCTAVES
+        for factor in (0.5, 1.0, 2.0)
     ]
 
 
 def fitted_beside(model: Model, location: Location, effect: AttachedEffect, z: Real) -> LinearFit | None:
     """Fit from the start that is best over short segments; None where none converges."""
     numbers = effect_numbers((effect,))
-    limit = np.concatenate([location.problem.limits(z), np.full(len(numbers), _UNBOUNDED)])
+    limit = np.concatenate([location.problem.limits(z), np.full(len(numbers), np.inf)])
     begun: list[tuple[Profile, AttachedEffect]] = []
     for start in _starts(effect):
         first = _beside(location.segments[0], model, start)
         at = np.concatenate([z, np.zeros(len(numbers))])
         with suppress(ModelError, np.linalg.LinAlgError):
-            begun.append((profiled(first, (), at, iterations=8, limit=limit), start))
+            begun.append((profiled(first, (), at, limit=limit), start))
     if not begun:
         return None
     best, start = min(begun, key=lambda one: one[0].chi)
@@ -121,5 +112,5 @@ def _moved(effect: AttachedEffect, further: Real) -> AttachedEffect:
     """Give the effect with its numbers moved, within their possible ranges but for what rounding adds."""
     numbers = effect_numbers((effect,))
     low, high = np.array([one.low for one in numbers]), np.array([one.high for one in numbers])
-    steps = np.clip(_STEP * further, low + 1e-9 * np.abs(low), high - 1e-9 * np.abs(high))
+    steps = np.clip(WIDE * further, low + ROUNDING * np.abs(low), high - ROUNDING * np.abs(high))
     return with_numbers((effect,), numbers, steps)[0]

@@ -7,20 +7,15 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
+from chladni.gap.calibration import OUTSIDE, PRECISION, RANK, RIDGE, RUNAWAY
 from chladni.gap.explanation.held_site import HeldSite
 from chladni.gap.explanation.trial import SiteTrial
 from chladni.gap.location.profile import Profile, bounded_minimum
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
-from chladni.gap.plant.tunable import OUTSIDE
 from chladni.gap.side_by_side import side_by_side
 from chladni.models.effects.trial import Numbers, Shape
 from chladni.signals.arrays import Real
-
-#: Beyond this, whitened, a force is no force but a law that left the numbers; its square still is one.
-_RUNAWAY = 1e100
-#: Of the scaled normal matrix: twice as much as rounding makes of a matrix without full rank.
-_FLOOR = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +90,7 @@ class Screen:
         # with a floor on what nothing determines: beside a transient that runs away slopes may be of any size.
         normal = slopes @ slopes.T + np.eye(len(slopes)) / 2
         self._size = np.sqrt(np.diag(normal))
-        scaled = normal / self._size / self._size[:, None] + _FLOOR * np.eye(len(slopes))
+        scaled = normal / self._size / self._size[:, None] + RIDGE * np.eye(len(slopes))
         self._factor = cho_factor(scaled) if len(slopes) else None
 
     def nothing(self) -> float:
@@ -118,14 +113,14 @@ class Screen:
 
         def cost(shape: Real) -> float:
             found = self.weigh(start.trial, tuple(shape.tolist()))
-            return found.cost if found is not None else 2 * abs(start.cost) + 1e6
+            return found.cost if found is not None else RUNAWAY
 
         size = len(start.shape)
         simplex = np.array([start.shape] * (size + 1))
         simplex[1:] += 0.15 * np.eye(size)
         best = minimize(
             cost, np.array(start.shape), method="Nelder-Mead",
-            options={"initial_simplex": simplex, "maxfev": 18 * size + 12, "xatol": 1e-4, "fatol": 0.1},
+            options={"initial_simplex": simplex, "maxfev": 18 * size + 12, "fatol": PRECISION},
         )  # fmt: skip
         found = self.weigh(start.trial, tuple(np.asarray(best.x).tolist()))
         return found if found is not None and found.cost < start.cost else start
@@ -135,7 +130,7 @@ class Screen:
         force = trial.form.build(shape)
         basis, rest = self._held.printed(force.basis), self._held.unexplained(force)
         # A law that ran away along the recovered motion prints nothing that could be weighed.
-        if not (np.all(np.abs(basis) < _RUNAWAY) and np.all(np.abs(rest) < _RUNAWAY)):
+        if not (np.all(np.abs(basis) < RUNAWAY) and np.all(np.abs(rest) < RUNAWAY)):
             return None
         amplitudes, misfit, z = self._solved(basis, rest)
         values = trial.form.values(shape, amplitudes)
@@ -149,7 +144,7 @@ class Screen:
         unit = basis[size > 0] / size[size > 0, None]
         own, to_slopes, cross = unit @ rest, self._slopes @ rest - self.z / 2, self._slopes @ unit.T
         shift, moved = self._eliminated(cross), self._eliminated(to_slopes)
-        scaled = np.linalg.lstsq(unit @ unit.T - cross.T @ shift, own - cross.T @ moved, rcond=1e-10)[0]
+        scaled = np.linalg.lstsq(unit @ unit.T - cross.T @ shift, own - cross.T @ moved, rcond=RANK)[0]
         step = moved - shift @ scaled
         if np.any(np.abs(self.z + step) > self.limit):
             scaled, step = self._bounded(unit, rest)
@@ -170,7 +165,7 @@ class Screen:
         both = np.vstack([unit, self._slopes])
         count, size = len(unit), len(self._slopes)
         free = np.concatenate([np.zeros(count), np.full(size, 0.5)])
-        normal = both @ both.T + np.diag(free) + 1e-12 * np.eye(count + size)
+        normal = both @ both.T + np.diag(free) + RIDGE * np.eye(count + size)
         toward = both @ rest
         toward[count:] -= self.z / 2
         low = np.concatenate([np.full(count, -np.inf), -self.limit - self.z])

@@ -2,14 +2,12 @@
 
 import numpy as np
 
+from chladni.gap.calibration import RIDGE
 from chladni.gap.location.profile import Profile
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.record_lines import all_lines
 from chladni.signals.arrays import Real
-
-#: Of a force's power the most that is taken for the force's own: none is told without noise.
-_SUREST = 1.0 - 1e-12
 
 
 def predicted_by_others(problem: LinearProblem, found: Profile) -> Real:
@@ -35,7 +33,8 @@ def predicted_by_others(problem: LinearProblem, found: Profile) -> Real:
     linear = view.response(force.transient, ())
     residual = ((whole.measured - linear) * whole.weight)[:, 0]
     told, strength = pattern.conj() * residual, np.abs(pattern) ** 2
-    believed = np.minimum(force.reliable, _SUREST)
+    # All is told of none without noise.
+    believed = np.minimum(force.reliable, 1.0 - RIDGE)
     total = strength.sum(axis=0)
     over_noise = np.where(total > 0, believed / (1.0 - believed) / np.where(total > 0, total, 1.0), 0.0)
     others = (told.sum(axis=0) - told) * over_noise / (1.0 + (total - strength) * over_noise)

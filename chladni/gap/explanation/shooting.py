@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.gap.calibration import PARTED
 from chladni.gap.explanation.contest import Contest
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.known_states import KnownStates
@@ -19,9 +20,6 @@ from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error
 from chladni.gap.tuning.residual import Whitening
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError, ModelError
-
-#: A misfit that grows by more than this when windows grow says that the run parted from the log's.
-_PARTED = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,7 +79,7 @@ class Shooting:
             level = shot.level + 1
             starts = _firsts(shot.fit, self.levels[shot.level], self.levels[level])
             longer = self._shot(shot.hypothesis, level, starts)
-            if longer is None or longer.misfit > _PARTED * max(shot.misfit, 1.0):
+            if longer is None or longer.misfit > PARTED * max(shot.misfit, 1.0):
                 break
             shot = longer
         return shot

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import BEGUN, FORMS, LESS, LOCATED, SAME, SLIP_FACTOR
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.location.locate import Located, Location, tuned_stepwise
 from chladni.gap.location.profile import Profile, profile_at, promises
@@ -15,12 +16,9 @@ from chladni.gap.side_by_side import side_by_side
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
-#: Factors on a value where its search begins: a resonance apart on a short segment.
-_FACTORS = (0.1, 0.2, 0.4, 0.65, 0.8, 1.25, 1.5, 2.5, 5.0, 10.0)
-#: Most values that are doubted together, and those that are followed of each round.
-_MOST, _FOLLOWED = 4, 8
-#: Share of the misfit that another doubted value must take away to be looked at.
-_WORTH = 0.3
+#: Of a value, where its search begins: a resonance apart on a short segment.
+_UPWARD = np.geomspace(np.log(SAME), np.log(SLIP_FACTOR), LOCATED)
+_E_FOLDS = (*-_UPWARD, *_UPWARD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +58,9 @@ def with_wrong_values(location: Location, located: Located, tunables: Tunables) 
 
 def _selected(location: Location, tunables: Tunables, start: Profile, sites: Sequence[Site]) -> list[_Doubted]:
     found = [_Doubted((), start)]
-    while tunables.names and len(found) <= _MOST:
+    while tunables.names and len(found) <= FORMS:
         tried = _next(location, tunables, found[-1], sites)
-        if tried is None or tried.profile.cost > (1.0 - _WORTH) * found[-1].profile.cost:
+        if tried is None or tried.profile.cost > LESS * found[-1].profile.cost:
             break
         found.append(tried)
     return found[1:]
@@ -75,7 +73,7 @@ def _next(location: Location, tunables: Tunables, known: _Doubted, sites: Sequen
     # Beside a force any segment is explained by any value: only the slopes on the record tell.
     ways += [] if sites else [_scanned(location, tunables, known)]
     # The best starts by either way: misfits of one way aren't those of the other, and both may end elsewhere.
-    best = [sorted(way, key=lambda one: one[0])[: _FOLLOWED // len(ways)] for way in ways]
+    best = [sorted(way, key=lambda one: one[0])[: BEGUN // len(ways)] for way in ways]
     starts = [(place, z) for way in best for _, place, z in way]
 
     def freed(one: tuple[int, Real]) -> _Doubted | None:
@@ -111,9 +109,9 @@ def _scanned(location: Location, tunables: Tunables, known: _Doubted) -> Iterato
     problem = location.segments[0]
     for place, name in enumerate(tunables.names):
         tried: list[_Start] = []
-        for factor in _FACTORS if place not in known.places else ():
+        for folds in _E_FOLDS if place not in known.places else ():
             z = np.array(known.profile.z)
-            z[place] = np.log(factor) / tunables.tolerance[place]
+            z[place] = folds / tunables.tolerance[place]
             with suppress(ModelError, np.linalg.LinAlgError):
                 tried += [(profile_at(problem, (), z).misfit, place, z)] if _may_go(name, z[place]) else []
         if tried:

@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from chladni.gap.calibration import BLOCK, CLEARLY, COVERAGE, DRAWS, FAR, LINES_A_TERM
 from chladni.gap.comparison.outside_band import products_outside
 from chladni.gap.location.followed_motion import unseen_losses
 from chladni.gap.location.level_change import LevelChange, level_change
@@ -15,18 +16,6 @@ from chladni.gap.location.sensor_location import SensorLocation, SensorSite
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Index, Mask, Real
 from chladni.signals.mode_set import ModeSet
-
-# A line tells something where the change has so many times the power of its noise.
-_LEAST_RATIO = 4.0
-# Lines over the unknowns of a fit, path and law together; with fewer nothing is told.
-_LINES_AN_UNKNOWN = 3
-# Neighbouring lines share a resonance, so whole blocks are drawn.
-_BLOCK = 8
-_DRAWS = 1000
-# A place is a rival where it is the better one in more than this share of the draws.
-_DOUBT = 0.025
-# Patterns that miss up to this many times as much are as good: what they miss is the modal model's error, not noise.
-_TIED = 1.5
 
 
 def locate_between_sensors(
@@ -78,7 +67,7 @@ def locate_between_sensors(
         outside=products_outside(loudest),
     )
     told = _telling(change)
-    if told.sum() < _LINES_AN_UNKNOWN * len(paths.free()):
+    if told.sum() < LINES_A_TERM * len(paths.free()):
         return whole
     return _located(whole, change, paths, told, np.random.default_rng(seed))
 
@@ -124,7 +113,7 @@ def _sites(
             interval=(float(low[place]), float(high[place])),
             pattern=1 - pattern[place],
             motion_rival=bool(followed[place]),
-            pattern_rival=pattern[place] <= _TIED * min(pattern),
+            pattern_rival=pattern[place] <= CLEARLY * min(pattern),
         )
         for place, name in enumerate(names)
     ]
@@ -140,24 +129,24 @@ def _places(outputs: Sequence[str]) -> list[tuple[tuple[str, ...], Real]]:
 
 def _telling(change: LevelChange) -> Mask:
     noise = np.sum(change.noise[1:] + change.noise[0], axis=(0, 1))
-    return np.asarray(np.sum(np.abs(change.change) ** 2, axis=(0, 1)) > _LEAST_RATIO * noise)
+    return np.asarray(np.sum(np.abs(change.change) ** 2, axis=(0, 1)) > FAR * noise)
 
 
 def _draws(lines: int, rng: np.random.Generator) -> Index:
     """``[draw, line]`` of whole blocks."""
-    blocks = lines // _BLOCK
-    first = rng.integers(0, blocks, (_DRAWS, blocks)) * _BLOCK
-    return np.asarray((first[:, :, None] + np.arange(_BLOCK)).reshape(_DRAWS, -1))
+    blocks = lines // BLOCK
+    first = rng.integers(0, blocks, (DRAWS, blocks)) * BLOCK
+    return np.asarray((first[:, :, None] + np.arange(BLOCK)).reshape(DRAWS, -1))
 
 
 def _interval(losses: Sequence[Real], drawn: Index) -> tuple[Real, Real]:
     """Ends ``[place]`` of the 95 % interval of the share explained."""
     shares = np.array([1 - one[drawn].mean(axis=1) for one in losses])
-    return np.percentile(shares, 2.5, axis=1), np.percentile(shares, 97.5, axis=1)
+    return np.quantile(shares, (1 - COVERAGE) / 2, axis=1), np.quantile(shares, (1 + COVERAGE) / 2, axis=1)
 
 
 def _rivals(losses: Sequence[Real], drawn: Index) -> Mask:
     """Places that the draws can't tell from the best one, itself included."""
     means = np.array([one[drawn].mean(axis=1) for one in losses])
     best = means[int(np.argmin([one.mean() for one in losses]))]
-    return np.asarray(np.mean(means <= best, axis=1) > _DOUBT)
+    return np.asarray(np.mean(means <= best, axis=1) > (1 - COVERAGE) / 2)

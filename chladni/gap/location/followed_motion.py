@@ -4,13 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import MOST_STEPS, SLIGHT, UNNOTICED
 from chladni.signals.arrays import Complex, Real
-
-# Normal equations are loaded by this share of their mean: functions of one motion are alike.
-_LOADING = 1e-6
-_STEPS = 60
-_SETTLED = 1e-6
-_FOLDS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,8 +42,8 @@ def unseen_losses(blocks: Complex, forces: Complex, change: Complex) -> Real:
     lines = np.arange(change.shape[2])
     if not forces.shape[1]:
         return np.asarray(losses)
-    for fold in range(_FOLDS):
-        seen, unseen = lines % _FOLDS != fold, lines % _FOLDS == fold
+    for fold in range(2):
+        seen, unseen = lines % 2 != fold, lines % 2 == fold
         path, law = _fitted(_products(blocks[..., seen], forces[..., seen], change[..., seen]))
         printed = _printed(path, law, blocks[..., unseen], forces[..., unseen])
         losses[unseen] = np.sum(np.abs(change[..., unseen] - printed) ** 2, axis=(0, 1))
@@ -75,20 +70,20 @@ def _fitted(products: _Products) -> tuple[Real, Real]:
     """Path and law whose product explains most: one after the other, from the best free product's first part."""
     gram, right = products.gram, products.right
     size = right.size
-    free = _solved(gram.transpose(0, 2, 1, 3).reshape(size, size), right.ravel(), loading=1e-4)
+    free = _solved(gram.transpose(0, 2, 1, 3).reshape(size, size), right.ravel(), loading=SLIGHT)
     law = np.linalg.svd(free.reshape(right.shape), full_matrices=False)[2][0]
     path, reached = np.zeros(len(right)), 0.0
-    for _ in range(_STEPS):
+    for _ in range(MOST_STEPS):
         path = _solved(np.einsum("tufg,f,g->tu", gram, law, law, optimize=True), right @ law)
         law = _solved(np.einsum("tufg,t,u->fg", gram, path, path, optimize=True), path @ right)
         # At its least-squares law a path explains this much power.
         explained = float(path @ right @ law)
-        if explained - reached <= _SETTLED * explained:
+        if explained - reached <= UNNOTICED * explained:
             break
         reached = explained
     return path, law
 
 
-def _solved(gram: Real, right: Real, *, loading: float = _LOADING) -> Real:
+def _solved(gram: Real, right: Real, *, loading: float = UNNOTICED) -> Real:
     loaded = gram + loading * (np.trace(gram) / len(gram) + np.finfo(float).tiny) * np.eye(len(gram))
     return np.asarray(np.linalg.solve(loaded, right))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
+from chladni.gap.calibration import ALIKE
 from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
 from chladni.gap.comparison.motion_functions import even_functions, odd_functions
 from chladni.gap.comparison.periodicity import periods_of
@@ -15,9 +16,6 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value
 from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
 from chladni.spectral.forms import MOTION_ORDER
-
-# Two levels nearer than this ratio aren't different levels.
-LEAST_RATIO = 1.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,10 +129,10 @@ def level_change(measurements: Sequence[Measurement]) -> LevelChange:
     (name,) = names
     ordered = sorted(measurements, key=lambda one: _level(one, name))
     level = np.array([_level(one, name) for one in ordered])
-    if len(ordered) < 2 or level[-1] < LEAST_RATIO * level[0]:
+    if len(ordered) < 2 or level[-1] < ALIKE * level[0]:
         raise EstimateError(
             f"{name} has {', '.join(f'{one:.3g}' for one in level)} RMS: a change with level needs logs whose "
-            f"levels differ by {LEAST_RATIO - 1:.0%} or more"
+            f"levels differ by {ALIKE - 1:.0%} or more"
         )
     lines = np.flatnonzero(np.all([_excited(one, name) for one in ordered], axis=0))
     found = [_responses(one, name, lines) for one in ordered]

@@ -6,6 +6,22 @@ from typing import Protocol
 
 import numpy as np
 
+from chladni.gap.calibration import (
+    ALIKE,
+    CLEARLY,
+    CYCLES,
+    CYCLES_ASKED,
+    FEWEST_SAMPLES,
+    FORMS,
+    LEADS,
+    LESS,
+    LOCATED,
+    PLACES,
+    PROFILE_STEPS,
+    RIDGE,
+    SEGMENTS,
+)
+from chladni.gap.comparison.short_log import modes_of
 from chladni.gap.location.noise_behind import noise_behind
 from chladni.gap.location.profile import Profile, profile_at, profiled
 from chladni.gap.plant.linear_problem import LinearProblem
@@ -19,20 +35,6 @@ from chladni.models.core.model import Model
 from chladni.signals.arrays import Real
 
 _Rough = tuple[Profile, Place]
-#: Lengths of the segments on which parameters are found, in periods of the lowest mode, one after another: short
-#: ones forgive a resonance that lies elsewhere, long ones tell it exactly.
-_SEGMENTS = (2.0, 8.0, 24.0)
-_SEGMENT_LINES = 1500
-_RECORD_LINES = 1500
-#: Places that are followed to the end: so many, and more where the segments don't tell them apart.
-_FOLLOWED, _FOLLOWED_AGAIN, _TIED, _MOST = 5, 4, 1.5, 10
-#: Pairs of bodies without a joint that are profiled with the other places.
-_PAIRS = 5
-#: Two forces explain everything at two sensors, and any law at one.
-_PAIR_SENSORS = 2
-#: Places that are paired with every other one, at least and at most; misfit over the best one's of a place that is
-#: level with it.
-_LEADING, _LEVEL = (2, 3), 1.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,14 +108,14 @@ def locate(
     view = segments[-1].view(tuned.z)
     places = placed(view, sites_of(view.compiled, measurement.output_names), measurement.output_names, noise)
     record = whole.on(_telling(whole))
-    plain = profiled(record, (), tuned.z, iterations=6)
+    plain = profiled(record, (), tuned.z)
     rough = _roughly((*segments, record), plain, places, start)
-    ranked = _followed(record, _tied([one.chi for one, _ in rough], rough, _FOLLOWED))
+    ranked = _followed(record, _tied([one.chi for one, _ in rough], rough, LOCATED))
     if ranked and ranked[0].profile.expected > 1 and _pays(plain, ranked[0].profile):
         record = record.with_noise(noise_behind(record, ranked[0].profile))
         again = [(one.profile, one.places[0]) for one in ranked]
-        ranked = _followed(record, _tied([one.profile.chi for one in ranked], again, _FOLLOWED_AGAIN))
-        plain = profiled(record, (), plain.z, iterations=4)
+        ranked = _followed(record, _tied([one.profile.chi for one in ranked], again, FORMS))
+        plain = profiled(record, (), plain.z, iterations=PROFILE_STEPS // 2)
     return Location(
         problem=record,
         tuned=plain,
@@ -124,7 +126,7 @@ def locate(
     )
 
 
-def located_pairs(location: Location, rough: int = 5) -> list[Located]:
+def located_pairs(location: Location, rough: int = LOCATED) -> list[Located]:
     """Profile forces at two places at a time; by rising misfit, none with one sensor.
 
     Two sensors don't tell pairs apart, since any two forces explain both; what is between them is whether the forces
@@ -139,18 +141,18 @@ def located_pairs(location: Location, rough: int = 5) -> list[Located]:
     that of a second one may explain nothing alone.
     """
     problem = location.problem
-    if len(problem.measured) < _PAIR_SENSORS:
+    if len(problem.measured) < 2:
         return []
     followed = list(location.ranked[:rough])
-    level = sum(one.profile.chi < _LEVEL * followed[0].profile.chi for one in followed)
-    leading = min(max(_LEADING[0], level), _LEADING[1])
+    level = sum(one.profile.chi < ALIKE * followed[0].profile.chi for one in followed)
+    leading = min(max(LEADS, level), PLACES)
     known = {one.places[0] for one in followed}
     pairs = [(one, other.places[0]) for place, one in enumerate(followed) for other in followed[place + 1 :]]
     pairs += [(one, other) for one in followed[:leading] for other in location.places if other not in known]
     found = []
     for first, second in pairs:
         sites = (first.places[0].sites[0], second.sites[0])
-        profile = profiled(problem, sites, first.profile.z, iterations=2)
+        profile = profiled(problem, sites, first.profile.z, iterations=PROFILE_STEPS // 4)
         found.append(Located(places=(first.places[0], second), profile=profile))
     return sorted(found, key=lambda one: one.profile.chi)
 
@@ -161,11 +163,9 @@ def _tuned_on_segments(model: Model, whole: LinearProblem, start: Real) -> tuple
         return (whole,), tuned_stepwise([whole], start)
     period = measurement.sample_rate_hz / lowest_hz(model, measurement)
     problems = []
-    for periods in _SEGMENTS:
-        length = int(np.clip(periods * period, 64, measurement.samples // 2))
-        lines = segment_lines(
-            length, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz, count=_SEGMENT_LINES
-        )
+    for periods in SEGMENTS:
+        length = int(np.clip(periods * period, 2 * FEWEST_SAMPLES, measurement.samples // 2))
+        lines = segment_lines(length, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz)
         problems.append(whole.on(lines))
     return tuple(problems), tuned_stepwise(problems, start)
 
@@ -183,18 +183,17 @@ def tuned_stepwise(
         At which forces may be anything.
     """
     limit = problems[0].limits(z) if limit is None else limit
-    found = profiled(problems[0], sites, z, iterations=8, limit=limit)
+    found = profiled(problems[0], sites, z, limit=limit)
     for problem in problems[1:]:
-        found = profiled(problem, sites, found.z, iterations=8, limit=limit)
+        found = profiled(problem, sites, found.z, limit=limit)
     return found
 
 
 def lowest_hz(model: Model, measurement: Measurement) -> float:
     """Lowest frequency of an oscillation that the record holds several times."""
-    values = np.linalg.eigvals(model.compile().a)
-    turning = np.abs(values[np.abs(values.imag) > 1e-3 * np.abs(values)]) / (2 * np.pi)
-    heard = turning[turning > 4.0 / measurement.duration_s]
-    return float(heard.min()) if heard.size else 20.0 / measurement.duration_s
+    turning = modes_of(model.compile())
+    heard = turning[turning > CYCLES / measurement.duration_s]
+    return float(heard.min()) if heard.size else CYCLES_ASKED / measurement.duration_s
 
 
 def _roughly(problems: Sequence[LinearProblem], plain: Profile, places: Sequence[Place], start: Real) -> list[_Rough]:
@@ -214,22 +213,24 @@ def _worth_a_profile(problem: LinearProblem, plain: Profile, places: Sequence[Pl
     """Leave out pairs of bodies that explain little at the tuned parameters, of which a model has many."""
     pairs = [place for place in places if all(site.kind == "pair" for site in place.sites)]
     found = side_by_side(lambda place: profile_at(problem, (place.sites[0],), plain.z).misfit, pairs)
-    kept = [pairs[place] for place in np.argsort(found, kind="stable")[:_PAIRS]]
+    kept = [pairs[place] for place in np.argsort(found, kind="stable")[:LOCATED]]
     return [place for place in places if place not in pairs or place in kept]
 
 
 def _rough_profile(problems: Sequence[LinearProblem], plain: Profile, place: Place, start: Real) -> Profile:
     sites, z = (place.sites[0],), start
     for problem in problems[:-1]:
-        z = profiled(problem, sites, z, iterations=4).z
-    found = [profiled(problems[-1], sites, each, iterations=4) for each in (z, plain.z)]
+        z = profiled(problem, sites, z, iterations=PROFILE_STEPS // 2).z
+    found = [profiled(problems[-1], sites, each, iterations=PROFILE_STEPS // 2) for each in (z, plain.z)]
     return min(found, key=lambda one: one.cost)
 
 
 def _followed(record: LinearProblem, rough: Sequence[_Rough]) -> list[Located]:
     # With one sensor all patterns are one place: nothing is known of it but that it explains all.
     found = [
-        Located(places=(place,), profile=profiled(record, (place.sites[0],), profile.z, iterations=4))
+        Located(
+            places=(place,), profile=profiled(record, (place.sites[0],), profile.z, iterations=PROFILE_STEPS // 2)
+        )
         for profile, place in rough
     ]
     return sorted(found, key=lambda one: one.profile.chi)
@@ -238,20 +239,18 @@ def _followed(record: LinearProblem, rough: Sequence[_Rough]) -> list[Located]:
 def _tied(chi: Sequence[float], rough: list[_Rough], least: int) -> list[_Rough]:
     """Keep the first few, and those behind them that are as good."""
     # Less than noise isn't better than noise: beside a floor that is too high others make use of what is spare.
-    tied = sum(one < _TIED * max(chi[0], 1.0) for one in chi)
-    return rough[: min(max(least, tied), _MOST)]
+    tied = sum(one < CLEARLY * max(chi[0], 1.0) for one in chi)
+    return rough[: min(max(least, tied), 2 * LOCATED)]
 
 
 def _telling(whole: LinearProblem) -> RecordLines:
     power = np.sum(np.abs(whole.measured * whole.weight) ** 2, axis=(0, 1))
     measurement = whole.measurement
-    return telling_lines(
-        power, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz, count=_RECORD_LINES
-    )
+    return telling_lines(power, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz)
 
 
 def _pays(plain: Profile, found: Profile) -> bool:
-    return found.chi < 0.7 * plain.chi
+    return found.chi < LESS * plain.chi
 
 
 def _shares(tuned: Profile, rough: Sequence[_Rough]) -> dict[str, float]:
@@ -280,7 +279,7 @@ def explained_share(tuned: Left, profile: Left) -> float:
     tuned
         Without any.
     """
-    gap = max(tuned.chi - 1.0, 1e-12)
+    gap = max(tuned.chi - 1.0, RIDGE)
     return float(np.clip((tuned.chi - max(profile.chi, 1.0)) / gap, 0.0, 1.0))
 
 

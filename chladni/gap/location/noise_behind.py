@@ -5,16 +5,12 @@ import itertools
 import numpy as np
 from scipy.optimize import nnls
 
+from chladni.gap.calibration import FAINT_WISH, FLOOR_BANDS, HARDLY_ANY, SAME
 from chladni.gap.comparison.autoregressive import noise_floor_of
 from chladni.gap.location.profile import Profile, Projection
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.record_lines import all_lines
 from chladni.gap.records.noise_floor import NoiseFloor
-
-#: Bands over which the noise of a sensor is taken for flat.
-_BANDS = 24
-#: A floor is lowered at most to this share of what it was estimated as.
-_LEAST = 0.05
 
 
 def noise_behind(problem: LinearProblem, found: Profile) -> NoiseFloor:
@@ -34,26 +30,26 @@ def noise_behind(problem: LinearProblem, found: Profile) -> NoiseFloor:
     left = np.abs(out.away(residual)[:, 0]) ** 2
     size = len(left)
     spread = np.abs(out.away(np.broadcast_to(np.eye(size)[:, :, None, None], (size, size, 1, left.shape[1])))) ** 2
-    edges = np.linspace(0, left.shape[1], _BANDS + 1).astype(np.int64)
+    edges = np.linspace(0, left.shape[1], FLOOR_BANDS + 1).astype(np.int64)
     factor = np.ones((size, left.shape[1]))
     for low, high in itertools.pairwise(edges):
         matrix = spread[:, :, 0, low:high].mean(axis=2).T
         # A sensor that the patterns take whole says nothing of its noise: a faint wish keeps it as it was.
-        wish = 0.02 * np.eye(size)
+        wish = FAINT_WISH * np.eye(size)
         found_power = nnls(
             np.vstack([matrix, wish]), np.concatenate([left[:, low:high].mean(axis=1), np.diag(wish)])
         )[0]
-        factor[:, low:high] = np.clip(found_power, _LEAST**2, 1.0)[:, None]
+        factor[:, low:high] = np.clip(found_power, HARDLY_ANY**2, 1.0)[:, None]
     former_density = problem.noise.density(whole.lines.cycles)
     # What no model follows a machine to is in the weight beside the noise.
-    density = np.maximum(factor / whole.weight[:, 0] ** 2 - whole.error, _LEAST**2 * former_density)
+    density = np.maximum(factor / whole.weight[:, 0] ** 2 - whole.error, HARDLY_ANY**2 * former_density)
     former = problem.noise
     return noise_floor_of(
         np.pad(density, ((0, 0), (1, 1 - measurement.samples % 2)), mode="edge"),
         samples=measurement.samples,
         freedom=np.full(size, 2.0 * left.shape[1]),
         method=tuple(
-            "explained residual" if np.mean(one) < 0.8 else old
+            "explained residual" if np.mean(one) < 1 / SAME else old
             for one, old in zip(factor, former.method, strict=True)
         ),
         upper_bound=former.upper_bound,

@@ -3,13 +3,9 @@
 import numpy as np
 from scipy.optimize import minimize
 
+from chladni.gap.calibration import SIGMAS, SLIGHT
 from chladni.gap.location.modal_paths import ModalPaths
 from chladni.signals.arrays import Complex, Real
-
-# Weights of a pattern may lie this many sigma from what the modal model says.
-_SIGMAS = 2.0
-# No shape is known better than this share of its largest weight.
-_LEAST_SPREAD = 1e-3
 
 
 def pattern_losses(paths: ModalPaths, direction: Real, change: Complex) -> Real:
@@ -29,7 +25,7 @@ def pattern_losses(paths: ModalPaths, direction: Real, change: Complex) -> Real:
     """
     expected, std = paths.weights(direction)
     known, outside = paths.outside_of(direction)
-    spread = np.maximum(std, _LEAST_SPREAD * np.abs(expected).max())
+    spread = np.maximum(std, SLIGHT * np.abs(expected).max())
     centre = np.tensordot(expected, paths.modal, 1) + known
     # Steps of one sigma, and of the size of the pattern for what nothing is known of.
     size = np.sqrt(np.mean(np.abs(centre) ** 2))
@@ -41,7 +37,7 @@ def pattern_losses(paths: ModalPaths, direction: Real, change: Complex) -> Real:
         args=(centre, steps, products),
         jac=True,
         method="L-BFGS-B",
-        bounds=[(-_SIGMAS, _SIGMAS)] * len(spread) + [(None, None)] * len(outside),
+        bounds=[(-SIGMAS, SIGMAS)] * len(spread) + [(None, None)] * len(outside),
     )
     pattern = centre + np.tensordot(found.x, steps, 1)
     return np.asarray(np.sum(np.abs(_off(pattern, change)) ** 2, axis=(0, 1)))

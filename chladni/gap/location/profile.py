@@ -7,16 +7,10 @@ import numpy as np
 from scipy.linalg import qr, solve_triangular
 from scipy.optimize import lsq_linear
 
+from chladni.gap.calibration import PROFILE_STEPS, RANK, RIDGE, ROUNDING, SHORTER, SLIGHT, ZERO
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.signals.arrays import Complex, Real
-
-_TOLD = 1e-3
-#: Of the largest singular value: below it columns are the same but for rounding.
-_RANK = 1e-10
-#: Share of its own curvature that each unknown is given where rounding leaves a bounded minimum without a root.
-_UNDETERMINED = 1e-12
-
 
 _Promise = tuple[Real, float]
 
@@ -107,7 +101,7 @@ class Elimination(Projection):
         )
         # Columns that print nothing, or the same as others, add nothing to what is taken away.
         left, values, _ = np.linalg.svd(self._upper)
-        kept = left[:, : values.size][:, values > _RANK * max(values.max(initial=0.0), 1e-300)]
+        kept = left[:, : values.size][:, values > RANK * max(values.max(initial=0.0), ZERO)]
         self._kept = kept @ kept.T
 
     def rest(self, spectra: Complex) -> Real:
@@ -125,7 +119,7 @@ class Elimination(Projection):
         scale = np.where(size > 0, 1.0 / np.where(size > 0, size, 1.0), 0.0)
         ratio = np.where(self._scale > 0, scale / np.where(self._scale > 0, self._scale, 1.0), 0.0)
         printed = self._basis.T @ _real(self.away(residual)).T
-        scaled = np.linalg.lstsq(self._upper * ratio, printed, rcond=_TOLD)[0]
+        scaled = np.linalg.lstsq(self._upper * ratio, printed, rcond=SLIGHT)[0]
         transient = np.asarray(scaled * scale[:, None], dtype=np.float64)
         if not len(self._patterns):
             return transient, []
@@ -147,7 +141,7 @@ def _forces(patterns: Complex, left: Complex) -> Complex:
     flat = patterns[:, :, 0]
     gram = np.einsum("aol,bol->lab", flat.conj(), flat)
     right = np.einsum("aol,oml->lam", flat.conj(), left)
-    tiny = 1e-12 * np.trace(gram, axis1=1, axis2=2).real
+    tiny = RIDGE * np.trace(gram, axis1=1, axis2=2).real
     tiny[tiny == 0] = 1.0
     found = np.linalg.solve(gram + tiny[:, None, None] * np.eye(len(flat)), right)
     return np.asarray(np.moveaxis(found, 0, -1), dtype=np.complex128)
@@ -162,7 +156,7 @@ def _orthonormal(patterns: Sequence[Complex]) -> list[Complex]:
             for known in basis:
                 rest = rest - known * np.sum(known.conj() * rest, axis=0)
         size = np.sqrt(np.sum(np.abs(rest) ** 2, axis=0))
-        sound = size > 1e-9 * np.sqrt(np.sum(np.abs(pattern) ** 2, axis=0))
+        sound = size > ROUNDING * np.sqrt(np.sum(np.abs(pattern) ** 2, axis=0))
         basis.append(np.where(sound, rest / np.where(sound, size, 1.0), 0.0))
     return basis
 
@@ -172,7 +166,7 @@ def profiled(
     sites: Sequence[Site],
     start: Real,
     *,
-    iterations: int = 8,
+    iterations: int = PROFILE_STEPS,
     limit: float | Real | None = None,
 ) -> Profile:
     """Refit the parameters and the transient while forces at `sites` may be anything.
@@ -188,7 +182,7 @@ def profiled(
         ((step, promised),) = _steps(problem, best, (limit,))
         if (
             here.misfit + here.prior / 2 - promised - (here.z + step) @ (here.z + step) / 2
-            < 1e-3 * here.expected**0.5
+            < SLIGHT * here.expected**0.5
         ):
             break
         improved = _searched(problem, here, step)
@@ -226,7 +220,7 @@ def bounded_minimum(normal: Real, toward: Real, low: Real, high: Real) -> Real:
     if np.all(plain >= low) and np.all(plain <= high):
         return np.asarray(plain, dtype=np.float64)
     # A start on a bound is inside by rounding only.
-    bounds = (np.minimum(low, -1e-12) * size, np.maximum(high, 1e-12) * size)
+    bounds = (np.minimum(low, -RIDGE) * size, np.maximum(high, RIDGE) * size)
     return np.asarray(lsq_linear(root.T, right, bounds=bounds, method="bvls").x / size, dtype=np.float64)
 
 
@@ -238,7 +232,7 @@ def _root(normal: Real) -> tuple[Real, Real]:
         root = np.linalg.cholesky(scaled)
     except np.linalg.LinAlgError:
         # Slopes beside a transient that runs away are of any size, and what is alike but for rounding has no root.
-        root = np.linalg.cholesky(scaled + _UNDETERMINED * np.eye(size.size))
+        root = np.linalg.cholesky(scaled + RIDGE * np.eye(size.size))
     return np.asarray(root, dtype=np.float64), size
 
 
@@ -248,7 +242,7 @@ def _searched(problem: LinearProblem, best: Profile, step: Real) -> _Fit | None:
         found = _fitted(problem, best.sites, best.z + share * step)
         if found.profile.cost < best.cost:
             return found
-        share *= 0.3
+        share *= SHORTER
     return None
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import DOUBTED, FAR, ROUNDING, SLIGHT, SMOOTH, ZERO
 from chladni.gap.location.profile import Profile, Projection
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.linear_view import View, Way
@@ -12,14 +13,6 @@ from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import RecordLines, all_lines
 from chladni.signals.arrays import Complex, Real
 from chladni.signals.value import Value
-
-#: Lines over which the power of an unknown force is taken for the same.
-_SMOOTH = 31
-#: Power over that of the lines that tell the force well, beyond which a line is believed only when it's so many times
-#: its noise: where a pattern fades, a little more noise than was thought makes a force of any size.
-_STRONGEST, _DOUBTED = 3.0, 30.0
-#: Of each state's power: what nobody knows of how states go together.
-_LOADED = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -180,7 +173,7 @@ def _power(pattern: Complex, beside: Sequence[Complex], left: Complex) -> tuple[
     away = Projection([one[:, None] for one in beside]).away
     pattern, left = away(pattern[:, None])[:, 0], away(left[:, None])[:, 0]
     strength = np.sum(np.abs(pattern) ** 2, axis=0)
-    thought = 1.0 / np.maximum(strength, 1e-200)
+    thought = 1.0 / np.maximum(strength, ZERO)
     plain = np.sum(pattern.conj() * left, axis=0) * thought
     # What no force explains says how much noise there is, where that is more than was thought.
     across = np.sum(np.abs(left) ** 2, axis=0) - np.abs(plain) ** 2 * strength
@@ -189,8 +182,8 @@ def _power(pattern: Complex, beside: Sequence[Complex], left: Complex) -> tuple[
     # Neighbours count by how well they tell the force: where a pattern fades, as that of a force on
     # accelerometers does toward 0 Hz, those that still see it speak for those that don't.
     say = 1.0 / noise**2
-    power = np.maximum(_smooth(say * (np.abs(plain) ** 2 - noise)) / np.maximum(_smooth(say), 1e-300), 0.0)
-    power = np.where(power > _DOUBTED * noise, power, np.minimum(power, _STRONGEST * _told(power, noise)))
+    power = np.maximum(_smooth(say * (np.abs(plain) ** 2 - noise)) / np.maximum(_smooth(say), ZERO), 0.0)
+    power = np.where(power > DOUBTED * noise, power, np.minimum(power, FAR * _told(power, noise)))
     return power, power / (power + noise), louder
 
 
@@ -207,7 +200,7 @@ def _starts(view: View, measured: Complex, weight: Real) -> Real:
         return np.zeros_like(spread)
     # What the log shows beyond the inputs' doing moves the states too.
     more = max(float(np.sum(np.abs(measured * weight) ** 2)) / driven, 1.0)
-    related = spread / size / size[:, None] + _LOADED * np.eye(size.size)
+    related = spread / size / size[:, None] + SLIGHT * np.eye(size.size)
     return np.asarray(np.linalg.inv(related) / size / size[:, None] / more)
 
 
@@ -227,19 +220,19 @@ def _transient(transients: Complex, weight: Complex, residual: Complex, start: R
     toward = np.einsum("apl,pl->a", weighted, residual).real
     # Of a transient that lies along the forces all but rounding is taken away: it is measured by what it was.
     own = np.finfo(np.float64).eps * np.sum(np.abs(transients) ** 2, axis=(1, 2))
-    size = np.sqrt(np.maximum(np.maximum(np.diag(normal), own), 1e-300))
-    scaled = np.linalg.lstsq(normal / size[:, None] / size, toward / size, rcond=1e-9)[0]
+    size = np.sqrt(np.maximum(np.maximum(np.diag(normal), own), ZERO))
+    scaled = np.linalg.lstsq(normal / size[:, None] / size, toward / size, rcond=ROUNDING)[0]
     return np.asarray(scaled / size, dtype=np.float64)[:, None]
 
 
 def _told(power: Real, noise: Real) -> float:
     """Mean power of a force ``[line]``, each line counted by how well it tells it."""
     say = power / noise
-    return float(say @ power / max(float(np.sum(say)), 1e-300))
+    return float(say @ power / max(float(np.sum(say)), ZERO))
 
 
 def _smooth(power: Real) -> Real:
-    if power.size < _SMOOTH:
+    if power.size < SMOOTH:
         return np.full_like(power, power.mean())
-    padded = np.pad(power, _SMOOTH // 2, mode="reflect")
-    return np.asarray(np.convolve(padded, np.full(_SMOOTH, 1.0 / _SMOOTH), mode="valid"), dtype=np.float64)
+    padded = np.pad(power, SMOOTH // 2, mode="reflect")
+    return np.asarray(np.convolve(padded, np.full(SMOOTH, 1.0 / SMOOTH), mode="valid"), dtype=np.float64)

@@ -3,10 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from chladni.gap.comparison.outside_band import LEAST_SHARE, ProductsOutside
-
-# Where a law of the named motion explains more than this, both sides of the place have their sensor.
-MOST = 0.5
+from chladni.gap.calibration import MOST, NOTICED
+from chladni.gap.comparison.outside_band import ProductsOutside
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +84,7 @@ class SensorLocation:
         # What follows another motion above the band says nothing of this place.
         above = self.outside if self.outside is not None and self.outside.motion == self.located.names else None
         shares = {"odd": (self.odd, above.odd if above else 0.0), "even": (self.even, above.even if above else 0.0)}
-        return tuple(kind for kind, found in shares.items() if max(found) >= LEAST_SHARE)
+        return tuple(kind for kind, found in shares.items() if max(found) >= NOTICED)
 
     def sentences(self) -> tuple[str, ...]:
         """Say it."""

@@ -7,6 +7,7 @@ from typing import Any, Protocol, Self, runtime_checkable
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from chladni.gap.calibration import AHEAD, GRANTED, KEPT, MANY, NUDGE, SLIGHT, SMOOTH, WIDE, Z_GRID
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.linear_view import Way
 from chladni.gap.plant.neighbours import Scaled
@@ -17,25 +18,6 @@ from chladni.models.core.model import Model
 from chladni.models.core.port_law import PortLaw
 from chladni.models.core.simulation import PortMotion
 from chladni.signals.arrays import Complex, Real
-
-#: Sigmas of a parameter between two runs that tell a slope: large against the jitter that friction leaves in a run.
-_NUDGE = 0.05
-#: Where in a record pulses are given, as a share of it, and their answer over the largest of each output: a machine
-#: answers otherwise in another pose, and small enough it answers as a linear one.
-_PULSES, _SMALL = (0.01, 0.3, 0.6), 1e-3
-#: Share of the largest input that the first pulse has, and steps until the answer has the size that's wanted.
-_FIRST, _STEPS = 0.02, 3
-#: Samples of an answer before its pulse: a law is asked within the step before, and an accelerometer feels it there.
-_AHEAD = 2
-#: How many times the answers to pulses are shifted to span what the plant does when it's let go, and the size of a
-#: decay over the largest one's below which it's rounding.
-_SHIFTS, _DECAY = 16, 1e-4
-#: Sigmas to which parameters are rounded where slopes and pulses are asked for: neighbours share them.
-_GRID = 0.5
-#: Lines over which the power of what is missed is taken for the same.
-_SMOOTH = 31
-#: Runs, slopes and answers that are kept.
-_RUNS, _SLOPES, _ANSWERS = 32, 8, 32
 
 
 class Response(Protocol):
@@ -108,11 +90,11 @@ class BlackBoxRuns:
         self.compiled = box.compile()
         names = [terminal.name for terminal in self.compiled.outputs]
         self._rows = [names.index(name) for name in measurement.output_names]
-        self._runs: Kept[Real] = Kept(_RUNS)
-        self._slopes: Kept[Real] = Kept(_SLOPES)
-        self._answers: Kept[Real] = Kept(_ANSWERS)
+        self._runs: Kept[Real] = Kept(4 * KEPT)
+        self._slopes: Kept[Real] = Kept(KEPT)
+        self._answers: Kept[Real] = Kept(4 * KEPT)
         self._decays: Kept[Real] = Kept(1)
-        self._sizes: Kept[float] = Kept(_ANSWERS)
+        self._sizes: Kept[float] = Kept(4 * KEPT)
         self._doubt: Kept[Real] = Kept(1)
 
     def at(self, z: Real) -> Real:
@@ -129,7 +111,7 @@ class BlackBoxRuns:
         return BlackBoxView(self, z, lines)
 
     def answer(self, z: Real, kind: str, name: str) -> Real:
-        """``[signal, sample]`` change by a force of one at a joint, or of an input, for the sample `_AHEAD`.
+        """``[signal, sample]`` change by a force of one at a joint, or of an input, for the sample `AHEAD`.
 
         The mean over a few pulses along the record, at parameters near z.
         """
@@ -160,7 +142,7 @@ class BlackBoxRuns:
         """``[output, line]`` power of what is missed at the nominal parameters that no linear view follows."""
         nominal = np.zeros(len(self.tunables.names))
         missed = lines.spectrum(self.measurement.outputs - self.at(nominal)[: len(self._rows)])
-        power = uniform_filter1d(np.mean(np.abs(missed) ** 2, axis=1), _SMOOTH, axis=-1, mode="reflect")
+        power = uniform_filter1d(np.mean(np.abs(missed) ** 2, axis=1), SMOOTH, axis=-1, mode="reflect")
         return np.asarray(self.doubt()[:, None] * power)
 
     def decays(self) -> Real:
@@ -173,9 +155,9 @@ class BlackBoxRuns:
     def _spanned(self) -> Real:
         nominal, samples = np.zeros(len(self.tunables.names)), self.measurement.samples
         rows = []
-        for shift in np.unique(np.geomspace(1, max(samples // 4, 1), _SHIFTS).astype(int)):
+        for shift in np.unique(np.geomspace(1, max(samples // 4, 1), MANY).astype(int)):
             for kind, name in self._sites():
-                answer = self.answer(nominal, kind, name)[:, _AHEAD + shift :]
+                answer = self.answer(nominal, kind, name)[:, AHEAD + shift :]
                 rows.append(np.pad(answer, ((0, 0), (0, samples - answer.shape[1]))))
         count, free = len(self._rows), np.array(rows)
         scale = np.std(self.measurement.outputs, axis=1)
@@ -183,7 +165,7 @@ class BlackBoxRuns:
         size = np.linalg.norm(seen, axis=1)
         free, seen = (one[size > 0] / size[size > 0].reshape(-1, *[1] * (one.ndim - 1)) for one in (free, seen))
         values, vectors = np.linalg.eigh(seen @ seen.T)
-        kept = values > _DECAY**2 * values.max(initial=0.0)
+        kept = values > GRANTED * values.max(initial=0.0)
         return np.asarray(np.tensordot((vectors[:, kept] / np.sqrt(values[kept])).T, free, axes=1))
 
     def _set(self, z: Real) -> BlackBox:
@@ -196,7 +178,7 @@ class BlackBoxRuns:
 
     def _differences(self, z: Real) -> Real:
         # Inward, where the other side may lie outside of what is possible.
-        steps = np.diag(np.where(z > 0, -_NUDGE, _NUDGE))
+        steps = np.diag(np.where(z > 0, -NUDGE, NUDGE))
         found = np.zeros((z.size, *self.at(z).shape))
         for place, step in enumerate(steps):
             found[place] = (self._signals(self._set(z + step), self.measurement.inputs) - self.at(z)) / step[place]
@@ -210,10 +192,11 @@ class BlackBoxRuns:
         return found / np.maximum(told, 1.0)
 
     def _answers_at(self, z: Real, kind: str, name: str) -> list[Real]:
-        """``[signal, sample]`` from `_AHEAD` before each pulse on, for one of one."""
-        places = [_AHEAD + int(share * self.measurement.samples) for share in _PULSES]
+        """``[signal, sample]`` from `AHEAD` before each pulse on, for one of one."""
+        # In thirds of the record: a machine answers otherwise in another pose.
+        places = [AHEAD + turn * self.measurement.samples // 3 for turn in range(3)]
         size = self._sizes.get((kind, name), lambda: self._size(kind, name, places[0]))
-        return [self._pulsed(z, kind, name, size, at)[:, at - _AHEAD :] / size for at in places]
+        return [self._pulsed(z, kind, name, size, at)[:, at - AHEAD :] / size for at in places]
 
     def _sites(self) -> list[tuple[str, str]]:
         joints = [("joint", port.name) for port in self.compiled.ports]
@@ -222,12 +205,12 @@ class BlackBoxRuns:
     def _size(self, kind: str, name: str, at: int) -> float:
         """Pulse that is answered by as little as is wanted."""
         nominal = np.zeros(len(self.tunables.names))
-        size = _FIRST * float(np.max(np.abs(self.measurement.inputs), initial=0.0)) or 1.0
-        for _ in range(_STEPS):
+        size = SLIGHT * float(np.max(np.abs(self.measurement.inputs), initial=0.0)) or 1.0
+        for _ in range(3):
             share = self._share(self._pulsed(nominal, kind, name, size, at))
-            if not share or 0.1 < share / _SMALL < 10.0:
+            if not share or 1 / WIDE < share / SLIGHT < WIDE:
                 break
-            size *= _SMALL / share
+            size *= SLIGHT / share
         return size
 
     def _share(self, change: Real) -> float:
@@ -250,7 +233,7 @@ class BlackBoxRuns:
 
 def _near(z: Real) -> Real:
     # Without the sign of zero: what is the same has one key.
-    return np.asarray(_GRID * np.round(z / _GRID) + 0.0)
+    return np.asarray(Z_GRID * np.round(z / Z_GRID) + 0.0)
 
 
 class BlackBoxView:
@@ -260,7 +243,7 @@ class BlackBoxView:
     """
 
     #: Pulses are followed to the record's end, and a step acts for all of itself.
-    rounding = 1e-3
+    rounding = SLIGHT
 
     def __init__(self, runs: BlackBoxRuns, z: Real, lines: RecordLines) -> None:
         self.compiled, self.lines = runs.compiled, lines
@@ -316,8 +299,8 @@ class BlackBoxView:
 
     def way_of_output(self, place: int) -> Way:
         """Way of an error of the sensor in row `place` of the measured outputs."""
-        error = np.zeros((self._spectrum.shape[0], _AHEAD + 1))
-        error[place, _AHEAD] = 1.0
+        error = np.zeros((self._spectrum.shape[0], AHEAD + 1))
+        error[place, AHEAD] = 1.0
         return self._way(error)
 
     def _way(self, answer: Real, *, port: int | None = None, column: int | None = None) -> Way:
@@ -325,7 +308,7 @@ class BlackBoxView:
         length = self.lines.samples
         folded = np.pad(answer, ((0, 0), (0, -answer.shape[1] % length)))
         printed = np.fft.rfft(folded.reshape(len(answer), -1, length).sum(axis=1), axis=1)[:, self.lines.index]
-        printed = printed * self.lines.z**_AHEAD
+        printed = printed * self.lines.z**AHEAD
         none = np.zeros((0, self.lines.index.size), dtype=np.complex128)
         return Way(
             states=printed[self._count :], outputs=printed[: self._count], carried=none, port=port, column=column

@@ -2,11 +2,9 @@
 
 import numpy as np
 
+from chladni.gap.calibration import ROUNDING
 from chladni.gap.plant.free_run import FreeRun
 from chladni.signals.arrays import Real
-
-#: Of the largest pattern of a start, all scaled to one: what is smaller than that is rounding.
-_ROUNDING = 1e-9
 
 
 def driven_parts(run: FreeRun) -> tuple[Real, Real]:
@@ -44,4 +42,4 @@ def _basis(patterns: Real) -> Real:
     size = np.linalg.norm(patterns, axis=1, keepdims=True)
     shapes = np.divide(patterns, size, out=np.zeros_like(patterns), where=size > 0)
     directions, share, _ = np.linalg.svd(shapes.T, full_matrices=False)
-    return np.asarray(directions[:, share > _ROUNDING * share[0]])
+    return np.asarray(directions[:, share > ROUNDING * share[0]])

@@ -6,6 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from chladni.gap.calibration import KEPT, PARTS, UNNOTICED
 from chladni.gap.plant.black_box import BlackBox, Response
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.laid_inputs import LaidInputs
@@ -26,10 +27,6 @@ from chladni.signals.errors import ModelError
 from chladni.signals.value import Value
 
 Windows = Sequence[tuple[int, int]]
-#: Integrators kept; a fit asks for the same model again when it draws, never for more than a few.
-_KEPT = 8
-#: Steps between samples where windows of a model with laws are marched through.
-PARTS = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,7 +70,7 @@ class FreeRun:
         model: Model,
         measurement: Measurement,
         *,
-        tolerance: float = 1e-6,
+        tolerance: float = UNNOTICED,
         windows: Windows | None = None,
     ) -> None:
         self.model = model
@@ -85,7 +82,7 @@ class FreeRun:
         self.rows = _rows(compiled, measurement)
         self.inputs = LaidInputs(measurement.inputs, measurement.sample_rate_hz)
         self._linear = LinearRuns(self.inputs)
-        self._integrators: Kept[Integrator] = Kept(_KEPT)
+        self._integrators: Kept[Integrator] = Kept(KEPT)
 
     def compiled(self, z: Real | None = None, effects: Sequence[Effect] = ()) -> CompiledModel:
         """Equations of the model at some parameters, with these effects behind those that it has."""

@@ -14,8 +14,6 @@ from chladni.signals.arrays import Real
 Values = Mapping[str, float]
 #: ``make(parameters, numbers)``: equations at values of parameters, SI, and ``[number]`` further ones.
 Make = Callable[[Values, Real], CompiledModel]
-#: Steps that a further number may take.
-_UNBOUNDED = 1e4
 
 
 def with_further(problem: LinearProblem, count: int, make: Make) -> LinearProblem:
@@ -47,7 +45,7 @@ class _Numbers:
         return self.tunables.wrong(z[: len(self.tunables.names)])
 
     def limits(self, freed: Collection[str] = ()) -> Real:
-        return np.concatenate([self.tunables.limits(freed), np.full(len(self.further), _UNBOUNDED)])
+        return np.concatenate([self.tunables.limits(freed), np.full(len(self.further), np.inf)])
 
     def values(self, z: Real) -> dict[str, float]:
         own = len(self.tunables.names)

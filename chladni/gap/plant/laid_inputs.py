@@ -5,14 +5,12 @@ from threading import Lock
 
 import numpy as np
 
+from chladni.gap.calibration import KEPT
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.hold import Hold
 from chladni.models.integrator.input_rows import input_rows
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-#: Ways that are kept: a fit asks for one, and for one more for each number of an actuator that it moves.
-_KEPT = 6
 
 
 class LaidInputs:
@@ -57,7 +55,7 @@ class LaidInputs:
         rows = input_rows(compiled, hold, self._signals, self.sample_rate_hz, extra=0)
         made = _finer(rows, hold, parts, 1.0 / self.sample_rate_hz)
         with self._lock:
-            self._kept = [*self._kept[1 - _KEPT :], (key, made)]
+            self._kept = [*self._kept[1 - KEPT :], (key, made)]
         return made
 
 

@@ -5,16 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from chladni.gap.plant.free_run import PARTS, FreeRun, initial_states, mapped_outputs, read_late
+from chladni.gap.calibration import PARTS, UNNOTICED, ZERO
+from chladni.gap.plant.free_run import FreeRun, initial_states, mapped_outputs, read_late
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.slopes import recorded, sensitivities
 from chladni.models.integrator.trapezoid_kernel import March
 from chladni.models.integrator.trapezoid_march import Equations, new_record, run_laws
 from chladni.signals.arrays import Real
-
-#: Relative change at which a map of samples (a sensor that clips) is told by differences.
-_MAP_CHANGE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +106,7 @@ def slopes_of(run: FreeRun, result: LawRunResult, changed: Sequence[tuple[Settin
         for place, (other, (_, by)) in enumerate(zip(others, changed, strict=True)):
             own[place] = (_mapped(run, other, result.before_maps + by * own[place]) - here) / by
         for place, one in enumerate(starts):
-            by = _MAP_CHANGE / max(np.abs(one).max(), 1e-300)
+            by = UNNOTICED / max(np.abs(one).max(), ZERO)
             starts[place] = (_mapped(run, result.compiled, result.before_maps + by * one) - here) / by
     return own, starts
 

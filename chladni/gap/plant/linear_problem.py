@@ -5,24 +5,21 @@ from typing import cast
 
 import numpy as np
 
+from chladni.gap.calibration import LAW_ERROR, SPARE_BYTES, STEP, THREADS
 from chladni.gap.plant.black_box import BlackBox, BlackBoxRuns
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.linear_view import LinearView, View, Way
-from chladni.gap.plant.neighbours import STEP, Neighbours, Scaled, Varied
+from chladni.gap.plant.neighbours import Neighbours, Scaled, Varied
 from chladni.gap.plant.places import Site, way_to
 from chladni.gap.plant.record_lines import RecordLines
 from chladni.gap.plant.view_slopes import same_frame, view_slopes
 from chladni.gap.records.measurement import Measurement
-from chladni.gap.records.noise_floor import LAW_ERROR, NoiseFloor
+from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.signals.arrays import Complex, Real
 
-#: Of a tunable's sigma: small against curvature, large against rounding of responses.
-_RESPONSE_STEP = 1e-4
-#: Complex numbers that slopes of some parameters at once may need beside their result: 64 MB.
-_AT_ONCE = 4_000_000
-#: Settings that are kept: one for each thread that may look at the problem.
-_VIEWS = 4
+#: Complex numbers that slopes of some parameters at once may need beside their result: a quarter of what is spare.
+_AT_ONCE = SPARE_BYTES // 64
 
 
 class LinearProblem:
@@ -50,7 +47,7 @@ class LinearProblem:
         self.noise = noise
         self._neighbours = _neighbours(model, tunables, measurement) if neighbours is None else neighbours
         self._inputs: dict[tuple[object, ...], Complex] = {}
-        self._views: Kept[View] = Kept(_VIEWS)
+        self._views: Kept[View] = Kept(THREADS)
         compiled = model.compile()
         names = [terminal.name for terminal in compiled.outputs]
         self.rows = tuple(names.index(name) for name in measurement.output_names)
@@ -148,10 +145,10 @@ class LinearProblem:
     def _difference(self, z: Real, place: int, transient: Real, forces: Sequence[tuple[Site, Complex]]) -> Complex:
         """Slope along a parameter that moves a dead time, which isn't in the equations."""
         here = self.response(z, transient, forces)
-        moved = z + _RESPONSE_STEP * np.eye(z.size)[place]
+        moved = z + STEP * np.eye(z.size)[place]
         there = self._linear(moved)
         ways = [(self.way(there, site), force) for site, force in forces]
-        slope = (there.response(transient, ways) * self.weight - here) / _RESPONSE_STEP
+        slope = (there.response(transient, ways) * self.weight - here) / STEP
         return np.asarray(slope, dtype=np.complex128)
 
 

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg import schur
 
+from chladni.gap.calibration import ROUNDING
 from chladni.gap.plant.record_lines import RecordLines
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
@@ -106,7 +107,7 @@ class LinearView:
     """
 
     #: But for this, patterns of one place are the same.
-    rounding = 1e-9
+    rounding = ROUNDING
 
     def __init__(
         self,

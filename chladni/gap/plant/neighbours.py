@@ -3,15 +3,11 @@
 from collections.abc import Collection, Mapping
 from typing import Protocol, Self
 
+from chladni.gap.calibration import KEPT, STEP
 from chladni.gap.plant.kept import Kept
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.effects.pair import unlinked_pairs, with_pair_ports
 from chladni.signals.arrays import Real
-
-#: Of a tunable's sigma: small against curvature, large against rounding of equations.
-STEP = 1e-5
-#: Settings that are kept: places are profiled one after another, each from the same start.
-_KEPT = 8
 
 
 class Scaled(Protocol):
@@ -54,8 +50,8 @@ class Neighbours:
         self._model, self._tunables = model, tunables
         # Where bodies share no joint the model may lack one. Which do is the same at all numbers.
         self._pairs = unlinked_pairs(model.compile())
-        self._at: Kept[CompiledModel] = Kept(_KEPT)
-        self._changed: Kept[tuple[CompiledModel, ...]] = Kept(_KEPT)
+        self._at: Kept[CompiledModel] = Kept(KEPT)
+        self._changed: Kept[tuple[CompiledModel, ...]] = Kept(KEPT)
 
     def at(self, z: Real) -> CompiledModel:
         """Give the equations at ``z [parameter]``, in units of their tolerance."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import LINES
 from chladni.signals.arrays import Complex, Real, Whole
 from chladni.signals.value import Value
 
@@ -65,7 +66,7 @@ def all_lines(samples: int, sample_rate_hz: float) -> RecordLines:
     return RecordLines(index=np.arange(1, (samples + 1) // 2), samples=samples, sample_rate_hz=sample_rate_hz)
 
 
-def segment_lines(segment: int, *, samples: int, sample_rate_hz: float, count: int = 4000) -> RecordLines:
+def segment_lines(segment: int, *, samples: int, sample_rate_hz: float, count: int = LINES) -> RecordLines:
     """Give all lines of segments of `segment` samples, spread evenly over a record, about `count` lines in all."""
     index = np.arange(1, (segment + 1) // 2)
     possible = samples // segment
@@ -75,7 +76,7 @@ def segment_lines(segment: int, *, samples: int, sample_rate_hz: float, count: i
     return RecordLines(index=index, samples=segment, sample_rate_hz=sample_rate_hz, starts=starts)
 
 
-def telling_lines(power: Real, *, samples: int, sample_rate_hz: float, count: int = 4000) -> RecordLines:
+def telling_lines(power: Real, *, samples: int, sample_rate_hz: float, count: int = LINES) -> RecordLines:
     """Choose about `count` lines: half where the power is highest, half spread evenly over the rest.
 
     Parameters

@@ -6,18 +6,11 @@ from typing import Self
 
 import numpy as np
 
+from chladni.gap.calibration import FURTHEST, OUTSIDE, SLIP, UNNOTICED
 from chladni.models.core.model import Model
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import ModelError
 from chladni.signals.value import Value, require_shape
-
-#: Sigmas of its tolerance beyond which a parameter is wrong, not uncertain.
-OUTSIDE = 3.0
-#: A slip of the pen is a factor of ten, a wrong unit or formula two to three: one sigma of what a wrong value may be
-#: wrong by, as a logarithm, and the furthest that is searched.
-SLIP, FURTHEST = float(np.log(3.0)), float(np.log(30.0))
-#: What rounding adds to a bound.
-_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,7 +55,7 @@ class Tunables(Value):
 
     def wrong(self, z: Real) -> tuple[str, ...]:
         """Names of the parameters that are wrong at ``z [parameter]``."""
-        return tuple(name for name, one in zip(self.names, z, strict=True) if abs(one) > OUTSIDE + _ROUNDING)
+        return tuple(name for name, one in zip(self.names, z, strict=True) if abs(one) > OUTSIDE + UNNOTICED)
 
     def limits(self, freed: Collection[str] = ()) -> Real:
         """``[parameter]`` bounds on ``abs(z)``, those of the freed ones as far as a wrong value is searched for."""

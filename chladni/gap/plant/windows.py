@@ -5,18 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from chladni.gap.calibration import QUARTER, ROUNDING, SHORTEST_WINDOW, THIRDS, TIMES, USUAL_S, ZERO
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.model import Model
 from chladni.signals.arrays import Complex, Mask
-
-#: How many of its slowest times a window lasts.
-_TIMES = 3.0
-#: Seconds of a window when nothing in the model has a time of its own.
-_USUAL_S = 1.0
-#: Shortest window, in samples; most of a record that one may take.
-_SHORTEST, _LARGEST_SHARE = 20, 0.25
-#: Windows that become one when nested ones grow.
-_GROWTH = 3
 
 
 def windows_for(model: Model, measurement: Measurement) -> tuple[tuple[int, int], ...] | None:
@@ -59,7 +51,7 @@ def windows_for(model: Model, measurement: Measurement) -> tuple[tuple[int, int]
 def short_windows(model: Model, measurement: Measurement) -> tuple[tuple[int, int], ...]:
     """Give windows as `windows_for` does, for any model."""
     rate, samples = measurement.sample_rate_hz, measurement.samples
-    length = np.clip(_longest_s(model, measurement) * rate, _SHORTEST, max(_SHORTEST, _LARGEST_SHARE * samples))
+    length = np.clip(_longest_s(model, measurement) * rate, SHORTEST_WINDOW, max(SHORTEST_WINDOW, QUARTER * samples))
     count = max(1, round(samples / float(length)))
     edges = np.round(np.linspace(0, samples, count + 1)).astype(int).tolist()
     return tuple(pairwise(edges))
@@ -77,13 +69,13 @@ def nested_windows(
 
     The last before the windows themselves is the last that's given; there's none when they are as short already.
     """
-    length = max(_longest_s(model, measurement) / _TIMES * measurement.sample_rate_hz, _SHORTEST)
+    length = max(_longest_s(model, measurement) / TIMES * measurement.sample_rate_hz, SHORTEST_WINDOW)
     parts = max(max(1, round((stop - start) / length)) for start, stop in windows)
     finest = [np.round(np.linspace(start, stop, parts + 1)).astype(int).tolist() for start, stop in windows]
     found = []
     while parts > 1:
         found.append(tuple(pair for edges in finest for pair in pairwise(edges)))
-        finest = [[*edges[:-1:_GROWTH], edges[-1]] for edges in finest]
+        finest = [[*edges[:-1:THIRDS], edges[-1]] for edges in finest]
         parts = len(finest[0]) - 1
     return found
 
@@ -101,7 +93,7 @@ def training_in_windows(windows: Sequence[tuple[int, int]]) -> Mask:
     """
     training = np.ones(windows[-1][1], dtype=np.bool_)
     for start, stop in windows:
-        third = (stop - start) // 3
+        third = (stop - start) // THIRDS
         training[start + third : stop - third] = False
     return training
 
@@ -113,7 +105,7 @@ def _poles(model: Model) -> Complex:
 def _lasting(poles: Complex, duration_s: float) -> Mask:
     """Poles that stay still within the record, or grow; a mode that rings as long is damped all the same."""
     slow = np.abs(poles) * duration_s < 1.0
-    grows = poles.real > 1e-9 * np.maximum(np.abs(poles), 1.0 / duration_s)
+    grows = poles.real > ROUNDING * np.maximum(np.abs(poles), 1.0 / duration_s)
     return np.asarray(slow | grows)
 
 
@@ -125,9 +117,13 @@ def _longest_s(model: Model, measurement: Measurement) -> float:
 
 def _horizon_s(poles: Complex, lasting: Mask) -> float:
     own = poles[~lasting]
-    times = np.maximum(-1.0 / np.minimum(own.real, -1e-300), 0.0)
+    times = np.maximum(-1.0 / np.minimum(own.real, -ZERO), 0.0)
     # Of what oscillates a few cycles show all there is, however long it rings.
-    times = np.where(np.abs(own.imag) > 0, np.minimum(times, 2 * np.pi / np.maximum(np.abs(own.imag), 1e-300)), times)
-    horizon = _TIMES * float(times.max()) if own.size else _USUAL_S
+    times = np.where(
+        np.abs(own.imag) > 0,
+        np.minimum(times, 2 * np.pi / np.maximum(np.abs(own.imag), ZERO)),
+        times,
+    )
+    horizon = TIMES * float(times.max()) if own.size else USUAL_S
     growth = float(poles.real.max(initial=-np.inf))
-    return min(horizon, _TIMES / growth) if growth > 0 and lasting.any() else horizon
+    return min(horizon, TIMES / growth) if growth > 0 and lasting.any() else horizon

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from chladni.gap.calibration import COVERAGE
 from chladni.gap.records.log_use import LogUse
 from chladni.signals.arrays import Real
 from chladni.signals.value import Value, require_shape
@@ -419,7 +420,7 @@ class Diagnosis:
     correlation: Correlation | None = None
     any_law: AnyLaw | None = None
     answer_set: tuple[Candidate, ...] = ()
-    coverage: float = 0.95
+    coverage: float = COVERAGE
 
     @property
     def restoring_force(self) -> RestoringForce | None:

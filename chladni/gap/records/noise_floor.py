@@ -4,14 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.gap.calibration import GRID
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.value import Value
-
-#: Share of an output's RMS that no law of a catalogue is righter than. More would hide faint effects in the quiet
-#: bands of coloured noise: with 1 % two of fifty made cases turned wrong, with 0.3 % one.
-LAW_ERROR = 3e-3
-# Of a spectrum for pictures: finer than any that is drawn beside it.
-LINES = 4097
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -72,7 +67,7 @@ class NoiseFloor(Value):
 
     def one_sided(self, sample_rate_hz: float) -> Real:
         """Give ``[output, line]`` power density from 0 to half the sample rate, unit^2/Hz; it adds up to rms^2."""
-        return 2 / sample_rate_hz * self.density(np.linspace(0.0, 0.5, LINES))
+        return 2 / sample_rate_hz * self.density(np.linspace(0.0, 0.5, 4 * GRID + 1))
 
     def whitened(self, residual: Real) -> Real:
         """Give ``[..., output, sample]`` residuals as white noise of unit variance, were they noise alone."""

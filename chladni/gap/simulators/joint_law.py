@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from chladni.gap.calibration import SLIGHT, UNNOTICED
 from chladni.models.core.port_law import PortLaw
 
 
@@ -72,7 +73,7 @@ def _advance(law: PortLaw, state: list[float], d: float, s: float, t: float, ste
     moved = []
     # A bristle bends within microns, far stiffer than the simulator's step: linearly implicit, state by state.
     for place, value in enumerate(state):
-        nudge = 1e-6 * max(abs(value), 1e-3)
+        nudge = UNNOTICED * max(abs(value), SLIGHT)
         nudged, rates_there = list(state), [0.0] * len(state)
         nudged[place] = value + nudge
         law.function(d, s, t, law.parameters, nudged, rates_there)

@@ -5,17 +5,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from chladni.gap.calibration import LARGEST, MOST_STEPS, ROUNDING, SLIGHT, UNNOTICED
 from chladni.models.integrator.machine_code import call_law, caller, machine_code, part_code
 from chladni.signals.arrays import Real, Whole
 
 _WORD = types.int64
 _STEP: Any = caller(_WORD(_WORD, _WORD))
 _SOLVE: Any = caller(_WORD(_WORD, _WORD, _WORD, _WORD, types.int32))
-_ROOT_STEPS = 60
-# Relative to the change of velocity that the law makes; far below what a step's own error leaves.
-_ROOT = 1e-9
-_RUNAWAY = 1e8
-_LARGEST_ACCELERATION = 1e9
 
 
 class Simulated(NamedTuple):
@@ -121,7 +117,7 @@ def advanced_force(laws: Laws, joint: int, d: float, s: float, t: float, step_s:
             call_law(function, d, s, t, numbers, nudged, rates)
         for place in range(start, start + count):
             value, rate = laws.state[place], laws.rates[place]
-            nudge = 1e-6 * max(abs(value), 1e-3)
+            nudge = UNNOTICED * max(abs(value), SLIGHT)
             laws.nudged[place] = value + nudge
             call_law(function, d, s, t, numbers, nudged, rates)
             slope = min((laws.rates[place] - rate) / nudge, 0.0)
@@ -156,11 +152,11 @@ def implicit_force(
         # It falls with speed by more than the inertia in one step: what it is at the explicit step must do.
         return force
     side = 0
-    for _ in range(_ROOT_STEPS):
+    for _ in range(MOST_STEPS):
         middle = (low * over - high * under) / (over - under)
         force = advanced_force(laws, joint, d, middle, t, step_s)
         left = middle - s - step_s * free + drop * force
-        if abs(left) <= _ROOT * size:
+        if abs(left) <= ROUNDING * size:
             break
         if left * over > 0.0:
             high, over = middle, left
@@ -222,7 +218,7 @@ def resist(mujoco: Simulated, laws: Laws, t: float, step_s: float) -> bool:
         for other in range(mujoco.smooth.size):
             mujoco.smooth[other] -= mujoco.column[other] * force
         # Beyond 1e10 MuJoCo would start anew by itself.
-        if not abs(mujoco.smooth[dof]) < _LARGEST_ACCELERATION:
+        if not abs(mujoco.smooth[dof]) < LARGEST:
             return False
     return True
 
@@ -244,7 +240,7 @@ def runs_away(mujoco: Simulated) -> bool:
         # Written so that NaN counts.
         if not abs(mujoco.velocity[dof]) <= largest:
             largest = abs(mujoco.velocity[dof])
-    return not largest < _RUNAWAY
+    return not largest < LARGEST
 
 
 @machine_code

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from chladni.gap.calibration import SOME
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.wording import nearest
 from chladni.signals.errors import ModelError
@@ -65,7 +66,7 @@ def parameter(model: Any, name: str, tolerance: float) -> Parameter:
             "a value other than zero, or leave it out"
         )
     rotates = number.kind == "joint" and turns(model, index(model, "joint", name.rpartition(".")[0]))
-    far = sorted((0.2 * value, 5.0 * value))
+    far = sorted((SOME * value, value / SOME))
     least = 0.0 if number.array != "actuator_gear" else -inf
     return Parameter(
         name=name,

@@ -12,6 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from chladni.gap.calibration import UNNOTICED
 from chladni.gap.simulators.joint_law import JointLaw
 from chladni.gap.simulators.mujoco_numbers import index, names, parameter, set_number, turns
 from chladni.gap.simulators.simulator import SimulatorResponse
@@ -23,9 +24,7 @@ from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 #: MuJoCo's integrators that step in two halves, between which laws can act.
-_INTEGRATORS = {0: "Euler", 2: "implicit", 3: "implicitfast"}
-#: MuJoCo takes larger numbers for a mistake, and begins anew.
-_LARGEST = 1e10
+_INTEGRATORS = ("Euler", "implicit", "implicitfast")
 _FUNCTIONS = ("mj_step1", "mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM", "mj_step2")
 #: Units of what sensors give, by MuJoCo's name; two where it depends on whether the joint turns or slides.
 _SENSOR_UNITS = {
@@ -95,7 +94,7 @@ class MujocoSimulator:
             mujoco.mj_setConst(model, data)
         _start(mujoco, model, data, self.keyframe)
         steps = _steps(float(model.opt.timestep), sample_rate_hz)
-        _require_commands(self, inputs)
+        _require_commands(self.name, self.inputs, inputs, float(mujoco.mjMAXVAL))
         return _run(self, model, data, np.ascontiguousarray(inputs, dtype=np.float64), steps, joint_laws)
 
 
@@ -138,10 +137,10 @@ def mujoco_simulator(
     """
     mujoco = _mujoco()
     loaded = _load(mujoco, model)
-    if int(loaded.opt.integrator) not in _INTEGRATORS:
+    if mujoco.mjtIntegrator(loaded.opt.integrator).name not in {f"mjINT_{name.upper()}" for name in _INTEGRATORS}:
         raise ModelError(
             "MuJoCo model: laws can't act within the steps of its integrator (RK4 or discrete); set "
-            f"<option integrator> to {', '.join(_INTEGRATORS.values())}"
+            f"<option integrator> to {', '.join(_INTEGRATORS)}"
         )
     if keyframe is not None:
         index(loaded, "key", keyframe)
@@ -239,7 +238,7 @@ def _start(mujoco: Any, model: Any, data: Any, keyframe: str | None) -> None:
 
 def _steps(step_s: float, sample_rate_hz: float) -> int:
     steps = 1.0 / (step_s * sample_rate_hz)
-    if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
+    if round(steps) < 1 or abs(steps - round(steps)) > UNNOTICED * steps:
         raise ModelError(
             f"MuJoCo model: its step of {step_s:g} s doesn't divide the log's sample interval of "
             f"{1 / sample_rate_hz:g} s; set <option timestep> to the interval over a whole number"
@@ -247,13 +246,13 @@ def _steps(step_s: float, sample_rate_hz: float) -> int:
     return round(steps)
 
 
-def _require_commands(simulator: MujocoSimulator, inputs: Real) -> None:
+def _require_commands(name: str, terminals: Sequence[Terminal], inputs: Real, largest: float) -> None:
     """Refuse what MuJoCo would take for zero, with a word on a file that nobody reads."""
-    for terminal, row in zip(simulator.inputs, inputs, strict=True):
-        if not np.all(np.abs(row) < _LARGEST):
+    for terminal, row in zip(terminals, inputs, strict=True):
+        if not np.all(np.abs(row) < largest):
             raise ModelError(
-                f"MuJoCo model {simulator.name!r}: input {terminal.name!r} reaches {np.max(np.abs(row)):g}; every "
-                f"sample must be finite and below {_LARGEST:g}"
+                f"MuJoCo model {name!r}: input {terminal.name!r} reaches {np.max(np.abs(row)):g}; every "
+                f"sample must be finite and below {largest:g}"
             )
 
 

@@ -2,11 +2,9 @@
 
 import numpy as np
 
+from chladni.gap.calibration import RIDGE
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
-
-#: Added to the curvature of each unknown, relative: what a log doesn't show at all must not make it singular.
-_RIDGE = 1e-15
 
 
 def bounded_step(curvature: Real, gradient: Real, low: Real, high: Real, *, damping: float) -> Real:
@@ -40,14 +38,14 @@ def bounded_step(curvature: Real, gradient: Real, low: Real, high: Real, *, damp
     scaled = curvature[np.ix_(moving, moving)] / np.multiply.outer(scale, scale)
     # Where initial states were eliminated rounding may leave a curvature just below zero.
     values, vectors = np.linalg.eigh(scaled)
-    sizes = np.sqrt(np.maximum(values, 0.0) + damping + scale.size * _RIDGE)
+    sizes = np.sqrt(np.maximum(values, 0.0) + damping + scale.size * RIDGE)
     root = sizes[:, None] * vectors.T
     target = -(vectors.T @ (gradient[moving] / scale)) / sizes
     free = vectors @ (target / sizes)
     below, above = low[moving] * scale, high[moving] * scale
     if np.any(free < below) or np.any(free > above):
         # The solver wants room between the bounds, also where an unknown stands on both.
-        above = np.maximum(above, below + 1e-12 * (1.0 + np.abs(below)))
+        above = np.maximum(above, below + RIDGE * (1.0 + np.abs(below)))
         free = lsq_linear(root, target, bounds=(below, above), method="bvls").x
     step[moving] = np.clip(free / scale, low[moving], high[moving])
     return step

@@ -3,12 +3,10 @@
 import numpy as np
 from scipy import fft
 
+from chladni.gap.calibration import LITTLE
 from chladni.gap.tuning.fit_problem import Evaluation, FitProblem, Slopes
 from chladni.gap.tuning.residual import weights
 from chladni.signals.arrays import Mask, Real
-
-#: Of the record: autocorrelations over longer lags are told by too few products.
-_LAGS = 0.1
 
 
 def coloured_information(problem: FitProblem, here: Evaluation, slopes: Slopes) -> Real:
@@ -43,7 +41,7 @@ def _spread_out(kept: Real, problem: FitProblem) -> Real:
 def _through(columns: Real, residual: Real, seen: Mask) -> Real:
     """``C R C'`` with the autocovariance of a residual that is 0 where it isn't seen."""
     size = fft.next_fast_len(2 * residual.size, real=True)
-    lags = max(int(_LAGS * residual.size), 1)
+    lags = max(int(LITTLE * residual.size), 1)
     covariance = _products(residual, size)[:lags] / np.maximum(_products(seen.astype(np.float64), size)[:lags], 1.0)
     # A noise that is told to be more than what is left is believed: it's one at least.
     covariance[0] = max(covariance[0], 1.0)

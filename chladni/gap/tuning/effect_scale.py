@@ -5,15 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.gap.calibration import SHARE_OF_RANGE, UNNOTICED
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
-
-#: Of the usual range, for a signed parameter that starts at zero.
-_SHARE_OF_RANGE = 0.02
-#: A positive parameter goes down to this share of its start: less does nothing that a log could show.
-_SMALLEST = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,9 +88,9 @@ def with_numbers(
 def _number(place: int, parameter: Parameter) -> EffectNumber:
     value, name = parameter.value, parameter.name
     if parameter.minimum >= 0 and value > 0:
-        lowest = max(parameter.minimum, _SMALLEST * value)
+        lowest = max(parameter.minimum, UNNOTICED * value)
         low, high = np.log(lowest / value), np.log(parameter.maximum / value)
         return EffectNumber(effect=place, name=name, start=value, scale=0.0, low=float(low), high=float(high))
-    scale = abs(value) or _SHARE_OF_RANGE * (parameter.high - parameter.low)
+    scale = abs(value) or SHARE_OF_RANGE * (parameter.high - parameter.low)
     low, high = (parameter.minimum - value) / scale, (parameter.maximum - value) / scale
     return EffectNumber(effect=place, name=name, start=value, scale=scale, low=low, high=high)

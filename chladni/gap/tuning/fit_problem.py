@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.gap.calibration import JITTER, RIDGE, RUNAWAY, STEP, UNNOTICED, WIDE, ZERO
 from chladni.gap.plant.free_run import FreeRun, initial_states
 from chladni.gap.plant.law_plant import LawRunResult, Setting, coarse_run, fine_run, slopes_of
 from chladni.gap.plant.linear_run import can_run
@@ -15,17 +16,6 @@ from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.integrator import Integrator
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError
-
-#: How far apart the two runs of a difference are, in ln(value) of a parameter.
-_APART = 1e-5
-#: The same of a plant whose step isn't ours: large against the jitter that friction leaves in its runs.
-_JITTER = 1e-2
-#: Precision of an effect's parameter before a log is seen: none, but for what keeps the equations regular.
-_UNKNOWN = 1e-6
-#: Curvatures beyond this say that neighbouring motions part, not what a parameter does.
-_PARTED = 1e100
-#: One sigma of an initial state is what alone would make the outputs this many times what was measured.
-_WIDE = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +103,7 @@ class FitProblem:
         limit = limit[: self.tuned] if held else np.full(self.tuned, np.inf)
         self.low = np.concatenate([-limit, [number.low for number in numbers]])
         self.high = np.concatenate([limit, [number.high for number in numbers]])
-        self._prior = np.concatenate([sure[: self.tuned], np.full(len(numbers), _UNKNOWN)])
+        self._prior = np.concatenate([sure[: self.tuned], np.full(len(numbers), UNNOTICED)])
         self._wide = np.zeros(0)
         compiled = run.compiled(start_z, self.effects)
         self.has_laws = bool(compiled.laws)
@@ -191,7 +181,7 @@ class FitProblem:
         with np.errstate(over="ignore", invalid="ignore"):
             found = self._equations(here, *self._columns(here, fresh=fresh))
         # NaN is beyond too.
-        if not (np.all(np.abs(found.curvature) < _PARTED) and np.all(np.isfinite(found.gradient))):
+        if not (np.all(np.abs(found.curvature) < RUNAWAY) and np.all(np.isfinite(found.gradient))):
             raise EstimateError(
                 "the run is too sensitive for a fit: its slopes leave the numbers; use shorter windows"
             )
@@ -294,7 +284,7 @@ class FitProblem:
 
     def _steps(self, x: Real) -> Real:
         """Steps of each unknown, away from the nearer bound."""
-        apart = _JITTER if self.run.is_black_box else _APART
+        apart = JITTER if self.run.is_black_box else STEP
         steps = np.concatenate([apart / self.run.tunables.tolerance[: self.tuned], np.full(len(self.numbers), apart)])
         return np.asarray(np.where(x + steps > self.high, -steps, steps))
 
@@ -305,9 +295,9 @@ class FitProblem:
                 alone = np.sqrt(np.mean(self._decays(point) ** 2, axis=(1, 2)))
             measured = np.mean(self.whitening.whitened(self.run.measurement.outputs) ** 2)
             # What grows beyond all numbers is seen all the more.
-            alone = np.where(np.isfinite(alone), alone, 1e100)
-            seen = alone > 1e-12 * max(alone.max(initial=0.0), 1e-300)
-            self._wide = np.where(seen, _WIDE * np.sqrt(measured) / np.where(seen, alone, 1.0), 0.0)
+            alone = np.where(np.isfinite(alone), alone, RUNAWAY)
+            seen = alone > RIDGE * max(alone.max(initial=0.0), ZERO)
+            self._wide = np.where(seen, WIDE * np.sqrt(measured) / np.where(seen, alone, 1.0), 0.0)
         return self._wide
 
     def _decays(self, point: Point) -> Real:
@@ -344,6 +334,6 @@ def _eliminated(own: Real, cross: Real, slope: Real) -> tuple[Real, Real]:
     if not np.all(np.isfinite(own)):
         return np.full(cross.shape, np.nan), np.full(len(own), np.nan)
     # A start that prints nothing (a state that no sensor sees) stays where it is.
-    held = own + np.diag(1e-13 * np.diag(own) + 1e-300) + np.diag(np.where(np.diag(own) > 0, 0.0, 1.0))
+    held = own + np.diag(RIDGE * np.diag(own) + ZERO) + np.diag(np.where(np.diag(own) > 0, 0.0, 1.0))
     solved = np.asarray(np.linalg.solve(held, np.column_stack([cross, slope])), dtype=np.float64)
     return solved[:, :-1], -solved[:, -1]

@@ -6,11 +6,9 @@ import numpy as np
 from scipy import fft
 from scipy.linalg import solve_toeplitz
 
-from chladni.gap.records.noise_floor import LAW_ERROR, NoiseFloor
+from chladni.gap.calibration import GRID, LAW_ERROR
+from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Real
-
-#: Intervals of the noise's spectrum from 0 to half the sample rate.
-_INTERVALS = 8192
 
 
 def with_law_error(noise: NoiseFloor, scale: Real) -> NoiseFloor:
@@ -34,7 +32,7 @@ def with_law_error(noise: NoiseFloor, scale: Real) -> NoiseFloor:
         return noise
     lags = noise.whitening.shape[1]
     # Of noise alone, and with the white error, whose covariance is all at lag 0.
-    alone = fft.irfft(noise.density(np.linspace(0.0, 0.5, _INTERVALS + 1)), axis=1)[:, :lags]
+    alone = fft.irfft(noise.density(np.linspace(0.0, 0.5, 8 * GRID + 1)), axis=1)[:, :lags]
     whitening = np.array([_filter(one, error) for one, error in zip(alone, (LAW_ERROR * scale) ** 2, strict=True)])
     spread = np.abs(np.subtract.outer(np.arange(lags), np.arange(lags)))
     level = np.einsum("oi,oij,oj->o", whitening, alone[:, spread], whitening)

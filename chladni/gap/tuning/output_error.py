@@ -6,6 +6,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from chladni.gap.calibration import DAMPINGS, GAINED, ITERATIONS, LITTLE, LONGEST, PRECISION, RIDGE, ZERO
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.bounded_step import bounded_step
@@ -18,24 +19,6 @@ from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError, ModelError
 from chladni.signals.value import Value, require_shape
-
-#: A step that promises less than this, in nats, changes no decision.
-PRECISION = 0.1
-#: A fit that can't get what its slopes promise has still converged when that is less.
-_STUCK = 2.0
-#: The same for a coarse run, for each sample: its power falls by less than two per cent.
-_COARSE = 0.01
-#: Most that one step may change an unknown: sigmas of a parameter, factors of e of an effect's.
-_LONGEST = 2.0
-#: An unknown that a log leaves as uncertain as it was.
-_UNDETERMINED = 0.9
-#: Least curvature of scaled unknowns.
-_FLAT = 1e-15
-#: Iterations that are left for fine runs at least.
-_FINE = 4
-_DAMPINGS = (0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
-#: Of them, those that are tried before slopes are asked for again.
-_ALONG_SECANTS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -120,7 +103,7 @@ def fit_output_error(
     held: bool = True,
     tune: bool = True,
     offsets: bool = True,
-    max_iterations: int = 12,
+    max_iterations: int = ITERATIONS,
     precision: float = PRECISION,
 ) -> OutputErrorFit:
     """Fit parameters, effects and initial states to a log.
@@ -234,7 +217,7 @@ def _fit(problem: FitProblem, start: Point, most: int, precision: float) -> tupl
     spent = 0
     if problem.coarse:
         # What a coarse run is wrong by is no reason to follow it further than this.
-        enough = _COARSE * problem.whitening.samples * problem.run.rows.size
+        enough = GAINED * problem.whitening.samples * problem.run.rows.size
         try:
             found, _, _, spent = _descend(problem, problem.evaluate(start), most, enough)
             start = found.point
@@ -242,7 +225,7 @@ def _fit(problem: FitProblem, start: Point, most: int, precision: float) -> tupl
             spent = 0
         problem.coarse = False
     here, slopes, converged, more = _descend(
-        problem, problem.evaluate(start), max(most - spent, min(most, _FINE)), precision
+        problem, problem.evaluate(start), max(most - spent, min(most, ITERATIONS // 3)), precision
     )
     return here, slopes, converged, spent + more
 
@@ -255,7 +238,7 @@ def _descend(problem: FitProblem, here: Evaluation, most: int, enough: float) ->
         iterations += not problem.stale
         found, promised, level = _search(problem, here, slopes, level)
         if found is None and not problem.stale:
-            return here, slopes, promised < _STUCK, iterations
+            return here, slopes, promised < enough, iterations
         gained, here = (0.0, here) if found is None else (here.cost - found.cost, found)
         done = found is None or max(promised, gained) < enough
         if done and not problem.stale:
@@ -273,14 +256,14 @@ def _search(
     """First damping whose step makes the cost less, from the one that did last time; what the first promised."""
     promised = np.inf
     # Along secants that don't lead on, more damping costs more than slopes do.
-    last = min(level + _ALONG_SECANTS, len(_DAMPINGS)) if problem.stale else len(_DAMPINGS)
+    last = min(level + 2, DAMPINGS + 1) if problem.stale else DAMPINGS + 1
     for place in range(level, last):
-        step = _step(problem, here, slopes, _DAMPINGS[place])
+        step = _step(problem, here, slopes, _damping(place))
         expected = _expected(slopes, step)
         promised = min(promised, expected) if np.isfinite(promised) else expected
         try:
             # Initial states were eliminated without damping: they are held back as much.
-            start = here.point.initial + slopes.initial_step(step) / (1.0 + _DAMPINGS[place])
+            start = here.point.initial + slopes.initial_step(step) / (1.0 + _damping(place))
             found = problem.evaluate(Point(here.point.x + step, start))
         except ModelError:
             continue
@@ -289,9 +272,14 @@ def _search(
     return None, promised, level
 
 
+def _damping(place: int) -> float:
+    """None, then by tens up to ten."""
+    return 10.0 ** (place + 1 - DAMPINGS) if place else 0.0
+
+
 def _step(problem: FitProblem, here: Evaluation, slopes: Slopes, damping: float) -> Real:
-    low = np.minimum(np.maximum(problem.low - here.point.x, -_LONGEST), 0.0)
-    high = np.maximum(np.minimum(problem.high - here.point.x, _LONGEST), 0.0)
+    low = np.minimum(np.maximum(problem.low - here.point.x, -LONGEST), 0.0)
+    high = np.maximum(np.minimum(problem.high - here.point.x, LONGEST), 0.0)
     return bounded_step(slopes.curvature, slopes.gradient, low, high, damping=damping)
 
 
@@ -349,18 +337,18 @@ def _spreads(problem: FitProblem, x: Real, covariance: Real) -> _Spreads:
         parameter_std=own * tunables.tolerance * np.abs(np.array([values[name] for name in tunables.names])),
         effect_std=_effect_std(problem, x, std),
         undetermined=tuple(
-            name for name, one in zip(tunables.names[: problem.tuned], std, strict=False) if one > _UNDETERMINED
+            name for name, one in zip(tunables.names[: problem.tuned], std, strict=False) if one > 1 - LITTLE
         ),
     )
 
 
 def _inverse(curvature: Real) -> Real:
     """Inverse of a matrix whose rows have very different units."""
-    size = np.sqrt(np.maximum(np.diag(curvature), np.finfo(np.float64).tiny))
+    size = np.sqrt(np.maximum(np.diag(curvature), ZERO))
     values, vectors = np.linalg.eigh(curvature / size[:, None] / size)
     # Directions that rounding leaves without curvature are as good as unknown.
     spread = vectors / size[:, None]
-    return np.asarray((spread / np.maximum(values, _FLAT)) @ spread.T, dtype=np.float64)
+    return np.asarray((spread / np.maximum(values, RIDGE)) @ spread.T, dtype=np.float64)
 
 
 def _effect_std(problem: FitProblem, x: Real, std: Real) -> tuple[Mapping[str, float], ...]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import ZERO
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError
@@ -50,7 +51,7 @@ class Whitening:
         self._whole = bool(training.all())
         self._offsets = offsets
         self._constant = self._kept(self.whitened(np.ones((noise.rms.size, training.size))))
-        self._size = np.maximum(np.sum(self._constant**2, axis=1), np.finfo(np.float64).tiny)
+        self._size = np.maximum(np.sum(self._constant**2, axis=1), ZERO)
 
     def whitened(self, signals: Real) -> Real:
         """``[..., output, sample]`` divided by the noise, its colour taken out."""

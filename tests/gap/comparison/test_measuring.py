@@ -244,8 +244,8 @@ def test_short_logs_are_told_and_very_short_ones_refused(tmp_path: Path) -> None
         "log.mcap is short: 150 samples, where 200 or more tell more; 0.0375 s hold 1.7 cycles"
     )
     assert sum("cycles of the lowest mode" in remark for remark in remarks) == 1
-    _, remarks = measurement_of(model, recording(WHOLE, samples=400, rate_hz=4000.0), log="log.mcap")
-    assert remarks == ("the log is short: 0.1 s hold 4.4 cycles of the lowest mode (44 Hz), 5 or more tell more",)
+    _, remarks = measurement_of(model, recording(WHOLE, samples=350, rate_hz=4000.0), log="log.mcap")
+    assert remarks == ("the log is short: 0.0875 s hold 3.9 cycles of the lowest mode (44 Hz), 4 or more tell more",)
     with pytest.raises(LogError, match="32 samples") as error:
         measurement_of(model, recording(WHOLE, samples=20), log="log.mcap")
     # Nothing is missing in it: to cut it further or to leave a channel out would be false advice.

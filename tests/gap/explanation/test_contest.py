@@ -5,12 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.explanation.contest import (
-    EFFECTIVE_SAMPLES,
-    Contest,
-    held_gap,
-    training_mask,
-)
+from chladni.gap.calibration import EFFECTIVE_SAMPLES
+from chladni.gap.explanation.contest import Contest, held_gap, training_mask
 from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.windows import training_in_windows

@@ -8,11 +8,12 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
+from chladni.gap.calibration import DETAILS, ELSEWHERE, SIZE, SLIP
 from chladni.gap.explanation.contest import Contest, training_mask
-from chladni.gap.explanation.evidence import DETAILS, ELSEWHERE, SIZE, Left, doubt_of, freedom_nats, left_of
+from chladni.gap.explanation.evidence import Left, doubt_of, freedom_nats, left_of
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.plant.free_run import FreeRun
-from chladni.gap.plant.tunable import SLIP, Tunables
+from chladni.gap.plant.tunable import Tunables
 from chladni.models.effects.attached_effect import attached
 from tests.gap.made_log import band_noise, measured, problem_of, three_bodies, white_floor
 

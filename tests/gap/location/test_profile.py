@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chladni.gap.calibration import LAW_ERROR
 from chladni.gap.location.profile import Elimination, bounded_minimum, profile_at, profiled
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import all_lines, segment_lines
 from chladni.gap.plant.tunable import Tunables
-from chladni.gap.records.noise_floor import LAW_ERROR
 from chladni.models.effects.attached_effect import attached
 from chladni.models.structures.structure_input import StructureInput
 from tests.gap.made_log import RATE_HZ, band_noise, chain, measured

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from chladni.gap.calibration import LAW_ERROR
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
-from chladni.gap.tuning.law_error import LAW_ERROR, with_law_error
+from chladni.gap.tuning.law_error import with_law_error
 from chladni.gap.tuning.output_error import fit_output_error
 from chladni.models.effects.attached_effect import attached
 from tests.gap.made_log import band_noise, chain, measured, white_floor
