@@ -48,6 +48,7 @@ _HOME = {
     "simulate": "chladni.models.integrator.simulate",
     "write_model": "chladni.models.files.model_file",
     "Wish": "chladni.models.analysis.wish",
+    "load_robot": "chladni.robots.loading",
     "load_setup": "chladni.io.setup",
     "open": "chladni.io.log",
     "open_log": "chladni.io.log",
@@ -99,6 +100,7 @@ __all__ = [
     "identify_modes",
     "influence",
     "load_model",
+    "load_robot",
     "load_setup",
     "locate_from_levels",
     "mac",
@@ -140,6 +142,7 @@ if TYPE_CHECKING:
     from chladni.models.effects.attached_effect import attached
     from chladni.models.files.model_file import load_model, write_model
     from chladni.models.integrator.simulate import simulate
+    from chladni.robots.loading import load_robot
     from chladni.signals.channel import Channel
     from chladni.signals.coherence import Coherence
     from chladni.signals.cross_spectra import CrossSpectra

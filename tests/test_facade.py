@@ -12,8 +12,8 @@ SURFACE = {
     "FrequencyResponse", "HalfPower", "LogError", "ModeSet", "ModelError", "PolyReferenceLeastSquares",
     "PowerSpectralDensity", "SetupError", "Study", "TimeSeries", "Wish", "analyse", "attached",
     "coherence", "cross_spectra", "diagnose_gap",
-    "find_peaks", "find_response_peaks", "frf", "identify_modes", "influence", "load_model", "load_setup",
-    "locate_from_levels", "mac",
+    "find_peaks", "find_response_peaks", "frf", "identify_modes", "influence", "load_model", "load_robot",
+    "load_setup", "locate_from_levels", "mac",
     "open", "open_log", "optimise", "psd",
     "relative_motion", "show", "simulate", "validate", "waterfall", "write_mcap", "write_model",
 }  # fmt: skip

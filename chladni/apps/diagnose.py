@@ -7,6 +7,7 @@ from pathlib import Path
 
 from chladni.apps.findings import reading_sentences, require_channels
 from chladni.apps.gap_document import Document, gap_document
+from chladni.apps.robot_gap import Topics, robot_gap
 from chladni.apps.sources import Span, joined
 from chladni.gap.comparison.measuring import MatchedLog, matched_log
 from chladni.gap.records.diagnosis import Diagnosis
@@ -19,6 +20,8 @@ from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.models.effects.wording import nearest
 from chladni.models.files.model_file import load_model
+from chladni.robots.loading import is_robot_file, load_robot
+from chladni.robots.robot import Robot
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import NS_PER_S, TimeSeries
@@ -31,7 +34,7 @@ NAMES_TOLD = 8
 
 
 def diagnose_gap(
-    model: Model | Path | str,
+    model: Model | Robot | Path | str,
     logs: Recording | Sequence[Recording],
     *,
     leave_out: Iterable[str] = (),
@@ -40,6 +43,8 @@ def diagnose_gap(
     start_s: float | None = None,
     end_s: float | None = None,
     join: JoinMethod = "auto",
+    state: str | None = None,
+    command: str | None = None,
     progress: StepProgress | None = None,
 ) -> Diagnosis:
     """Say where a model and the logs of its machine disagree, which unmodelled effect causes it, and what it closes.
@@ -47,7 +52,7 @@ def diagnose_gap(
     Parameters
     ----------
     model
-        What the simulation believes, or its file.
+        What the simulation believes, or its file: a model, or a robot (MJCF, URDF, robot file; see docs/robots.md).
     logs
         A log or data file, or several: their paths, opened, or series. Channels are those that the model's inputs and
         outputs name.
@@ -61,6 +66,8 @@ def diagnose_gap(
         Only samples with ``start_s <= t < end_s``, seconds from each log's start.
     join
         How channels of several sampling grids become one, see `chladni.signals.resampling.join_resampled`.
+    state, command
+        Of a robot: topics of the log with its joints' states and commands; chosen where they aren't given.
     progress
         Called with the name of the step and the share done, 0 to 1.
 
@@ -86,6 +93,12 @@ def diagnose_gap(
     >>> found.verdict, found.causes[0].effect, found.causes[0].site  # doctest: +SKIP
     ('effect', 'coulomb_friction', 'elbow')
     """
+    if isinstance(model, Robot) or (isinstance(model, Path | str) and is_robot_file(Path(model))):
+        if own_effects:
+            raise SetupError("own_effects act in models; a robot's words are those of docs/robots.md")
+        robot = model if isinstance(model, Robot) else load_robot(model, meshes=False)
+        topics = Topics(state=state, command=command)
+        return robot_gap(robot, _several(logs), leave_out, topics, Span(start_s=start_s, end_s=end_s), progress)
     # Here, because it compiles what it simulates with, which a look at the façade shouldn't pay for.
     from chladni.gap.diagnosis.diagnose import diagnose
 

@@ -21,13 +21,15 @@ if TYPE_CHECKING:
     from chladni.gap.records.diagnosis import Diagnosis
     from chladni.io.log import Log
     from chladni.models.core.model import Model
+    from chladni.robots.machine import Machine
+    from chladni.robots.robot import Robot
     from chladni.viewers.gap_evidence import GapEvidence
 
 Files = Annotated[
     list[Path],
     typer.Argument(
         metavar="MODEL LOG...",
-        help="A model file, then logs or data files of the machine; several levels tell more.",
+        help="A model file or a robot (MJCF, URDF, robot file), then logs of the machine; several levels tell more.",
         show_default=False,
     ),
 ]
@@ -62,10 +64,18 @@ Recording = Annotated[
 ExplainedModel = Annotated[
     Path | None,
     typer.Option(
-        metavar="FILE.toml",
-        help="Write the model, tuned and with the effects that were found.",
+        metavar="FILE",
+        help="Write the model (.toml) or the robot's description (.xml, .urdf) with what was found.",
         show_default=False,
     ),
+]
+
+
+State = Annotated[
+    str | None, typer.Option(metavar="TOPIC", help="Of a robot: where its joints were measured.", show_default=False)
+]
+Command = Annotated[
+    str | None, typer.Option(metavar="TOPIC", help="Of a robot: where its joints were commanded.", show_default=False)
 ]
 
 
@@ -86,6 +96,8 @@ def gap(
     figures: options.Figures = None,
     save: Recording = None,
     write_model: ExplainedModel = None,
+    state: State = None,
+    command: Command = None,
 ) -> None:
     """Where a model and a log disagree, which effect was left out, and how far the gap closes with it."""
     wanted = _Wanted(json=json, report=report, figure=figure, figures=figures, save=save, write_model=write_model)
@@ -106,8 +118,12 @@ def gap(
             _compare(out, pairs, wanted, Span(start_s=start, end_s=end, join=join))
             return
         model, logs = _model_and_logs(files)
-        _diagnose(out, model, [opening(log) for log in logs], wanted, without=without or (), seed=seed,
-                  span=Span(start_s=start, end_s=end, join=join))  # fmt: skip
+        asked = _Asked(
+            without=without or (), seed=seed, span=Span(start_s=start, end_s=end, join=join), state=state,
+            command=command,
+        )  # fmt: skip
+        asked.require_fitting(model, wanted.write_model)
+        _diagnose(out, model, [opening(log) for log in logs], wanted, asked)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,8 +157,33 @@ class _Wanted:
         }
 
 
-def _model_and_logs(files: "Sequence[Path]") -> "tuple[Model, Sequence[Path]]":
-    """Read the model; `SetupError` when there's no log beside it, or a log in its place."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """How a diagnosis was asked for."""
+
+    without: "Sequence[str]"
+    seed: int
+    span: "Span"
+    state: str | None
+    command: str | None
+
+    def require_fitting(self, model: "Model | Robot", written: Path | None) -> None:
+        """Refuse topics of joints for what is no robot, and a name of another kind of file than is written."""
+        from chladni.robots.robot import Robot
+        from chladni.signals.errors import SetupError
+
+        given = [name for name, topic in (("--state", self.state), ("--command", self.command)) if topic is not None]
+        if given and not isinstance(model, Robot):
+            raise SetupError(f"{', '.join(given)}: names a topic of a robot's joints, and {model.name!r} is a model")
+        right = (".xml", ".urdf") if isinstance(model, Robot) else (".toml",)
+        if written is not None and written.suffix.lower() not in right:
+            raise SetupError(
+                f"{written}: --write-model writes {' or '.join(right)} of {model.name!r}; give such a name"
+            )
+
+
+def _model_and_logs(files: "Sequence[Path]") -> "tuple[Model | Robot, Sequence[Path]]":
+    """Read the model or robot; `SetupError` when there's no log beside it, or a log in its place."""
     from chladni.io.files.formats import FILE_SUFFIXES, MCAP
     from chladni.models.files.model_file import load_model
     from chladni.signals.errors import SetupError
@@ -152,7 +193,9 @@ def _model_and_logs(files: "Sequence[Path]") -> "tuple[Model, Sequence[Path]]":
         raise SetupError(f"{first}: is a log; give a model file first, or --simulated {first} for a comparison alone")
     if not logs:
         raise SetupError(f"{first}: no log to hold against the model; give one behind it")
-    return load_model(first), logs
+    from chladni.robots.loading import is_robot_file, load_robot
+
+    return load_robot(first, meshes=False) if is_robot_file(first) else load_model(first), logs
 
 
 def _require_pairs(
@@ -177,13 +220,10 @@ def _require_pairs(
 
 def _diagnose(
     out: Output,
-    model: "Model",
+    model: "Model | Robot",
     logs: "Sequence[Log]",
     wanted: _Wanted,
-    *,
-    without: "Sequence[str]",
-    seed: int,
-    span: "Span",
+    asked: _Asked,
 ) -> None:
     from chladni.apps.diagnose import diagnose_gap
     from chladni.apps.gap_document import gap_document
@@ -194,11 +234,13 @@ def _diagnose(
         found = diagnose_gap(
             model,
             logs,
-            leave_out=without,
-            seed=seed,
-            start_s=span.start_s,
-            end_s=span.end_s,
-            join=span.join,
+            leave_out=asked.without,
+            seed=asked.seed,
+            start_s=asked.span.start_s,
+            end_s=asked.span.end_s,
+            join=asked.span.join,
+            state=asked.state,
+            command=asked.command,
             progress=lambda step, share: progress(share, step),
         )
     # First: what took so long to find isn't lost to a picture or a model that can't be written.
@@ -206,7 +248,26 @@ def _diagnose(
     print_diagnosis(out, found)
     _draw(out, found, model, wanted)
     if wanted.write_model is not None:
-        _write_model(out, found, model, wanted.write_model)
+        _write_explained(out, found, model, wanted.write_model)
+
+
+def _write_explained(out: Output, found: "Diagnosis", model: "Model | Robot", path: Path) -> None:
+    from chladni.robots.robot import Robot
+
+    if not isinstance(model, Robot):
+        _write_model(out, found, model, path)
+    elif found.machine is not None:
+        _write_robot(out, found.machine, path)
+
+
+def _write_robot(out: Output, machine: "Machine", path: Path) -> None:
+    from chladni.robots.written import write_robot
+
+    written = write_robot(machine, path)
+    out.line(f"description: {written.description}")
+    if written.robot_file is not None:
+        out.line(f"robot file: {written.robot_file}")
+    out.lines([f"not in the description: {one}" for one in written.not_held])
 
 
 def _write_model(out: Output, found: "Diagnosis", model: "Model", path: Path) -> None:
@@ -272,7 +333,7 @@ def _draw_comparisons(
         out.line(f"report: {wanted.report}")
 
 
-def _draw(out: Output, found: "Diagnosis", model: "Model", wanted: _Wanted) -> None:
+def _draw(out: Output, found: "Diagnosis", model: "Model | Robot", wanted: _Wanted) -> None:
     """Write the pictures that were asked for, and say where they are."""
     if not any((wanted.report, wanted.figure, wanted.figures, wanted.save)):
         return
@@ -287,10 +348,13 @@ def _draw(out: Output, found: "Diagnosis", model: "Model", wanted: _Wanted) -> N
         out.line(f"figure: {wanted.figure}")
     if wanted.save is not None:
         from chladni.apps.gap_structure import structure_sketch
+        from chladni.robots.robot import Robot
         from chladni.viewers.rerun.gap import write_gap_rrd
 
         # A structure coloured by nothing would look like one that can't explain the gap anywhere.
-        sketch = structure_sketch(model, found.where) if found.where.sites else None
+        sketch = None
+        if found.where.sites and not isinstance(model, Robot):
+            sketch = structure_sketch(model, found.where)
         write_gap_rrd(evidence, wanted.save, sketch=sketch)
         out.line(f"recording: {wanted.save}")
 

@@ -15,7 +15,7 @@ SUFFIXES: Mapping[str, tuple[str, ...]] = {
     "--html": (".html", ".htm"),
     "--report": (".html", ".htm"),
     "--save": (".rrd",),
-    "--write-model": (".toml",),
+    "--write-model": (".toml", ".xml", ".urdf"),
 }
 
 

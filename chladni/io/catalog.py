@@ -26,7 +26,7 @@ from chladni.io.stamps import (
 )
 from chladni.io.stream import Stream
 from chladni.io.topic import Topic, apart, read_arrivals, read_earlier_heads, read_heads, topics_of
-from chladni.io.topic_channels import TopicChannels, topic_channels
+from chladni.io.topic_channels import NumberLists, TopicChannels, topic_channels
 from chladni.signals.errors import LogError, SetupError
 
 #: Channels that a log may list; MCAP numbers its own with 16 bits.
@@ -122,6 +122,12 @@ class Catalog:
         except LogError:
             return False
         return self.topics[source.topic].may_hold(source)
+
+    @property
+    def number_lists(self) -> tuple[NumberLists, ...]:
+        """Lists of numbers in the messages of all topics that have channels."""
+        listed = dict.fromkeys(source.topic for source in self.channels)
+        return tuple(lists for name in listed for lists in self.topics[name].number_lists())
 
     def publishing_with(self, topic: str) -> int:
         """How many publish at once on a listed topic, or with it where it is one of several publishers itself."""

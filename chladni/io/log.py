@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from chladni.io.files.formats import MCAP, file_kind
 from chladni.io.log_info import LogInfo
-from chladni.io.log_reader import SampleGrid, several_grids
+from chladni.io.log_reader import SampleGrid, StampedSamples, several_grids
 from chladni.io.loss import Loss, Unread
 from chladni.io.mcap.limits import Limits
 from chladni.io.setup import Setup, load_setup
@@ -19,6 +19,7 @@ from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import TimeSeries
 
 if TYPE_CHECKING:
+    from chladni.io.topic_channels import NumberLists
     from chladni.signals.frequency_response import FrequencyResponse
     from chladni.signals.mode_set import ModeSet
     from chladni.signals.resampling import JoinMethod
@@ -146,6 +147,11 @@ class Log(ABC):
         return ()
 
     @property
+    def number_lists(self) -> "tuple[NumberLists, ...]":
+        """Lists of numbers in messages, an element for each joint or motor, as in JointState; none in data files."""
+        return ()
+
+    @property
     def functions(self) -> "FrequencyResponse | None":
         """Frequency responses that the file holds ready-made, as universal files do."""
         return None
@@ -227,6 +233,31 @@ class Log(ABC):
         LogError
             As `read` does, but not when channels have different grids.
         """
+
+    def stamped(
+        self, paths: Sequence[str], *, start_s: float | None = None, end_s: float | None = None
+    ) -> tuple["StampedSamples", ...]:
+        """Read channels as they were stamped, on no grid: events, or what is set now and then.
+
+        Parameters
+        ----------
+        paths, start_s, end_s
+            As for `read`.
+
+        Returns
+        -------
+        tuple of StampedSamples
+            One for all channels whose samples come in the same messages.
+
+        Raises
+        ------
+        LogError
+            When there is no such channel.
+        """
+        return tuple(
+            StampedSamples(channels=part.channels, times_ns=part.times_ns(), values=part.values)
+            for part in self.read_groups(paths, start_s=start_s, end_s=end_s)
+        )
 
     @abstractmethod
     def blocks(

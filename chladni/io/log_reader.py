@@ -6,6 +6,7 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chladni.io.clock.grid_index import NOWHERE
 from chladni.io.clock.shared_clocks import Key, Stamped, StreamClock
@@ -76,6 +77,25 @@ class SampleGrid:
     def duration_s(self) -> float:
         """Number of samples over the rate."""
         return self.samples / self.sample_rate_hz
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StampedSamples:
+    """Samples at the times that their messages give.
+
+    Attributes
+    ----------
+    channels
+        One for each row of `values`.
+    times_ns
+        ``[sample]``, rising, nanoseconds since the Unix epoch.
+    values
+        ``[channel, sample]``, in each channel's unit.
+    """
+
+    channels: tuple[Channel, ...]
+    times_ns: Whole
+    values: NDArray[np.floating]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -163,6 +183,20 @@ class LogReader:
         by_stream = {id(one.stream): one for one in gatherings}
         series = [self._laid_out(group, by_stream) for group in groups]
         return self._some([one for one in series if one is not None])
+
+    def stamped(self) -> tuple[StampedSamples, ...]:
+        """Everything as it was stamped, a stream each; of several messages with one stamp the last counts."""
+        found = []
+        for one in gather(self.streams, self.pieces(), with_values=True):
+            times_ns = np.concatenate(one.stamps_ns) if one.stamps_ns else np.zeros(0, np.int64)
+            values = np.concatenate(one.values, axis=1) if one.values else np.zeros((len(one.stream.channels), 0))
+            order = np.argsort(times_ns, kind="stable")
+            last = np.append(np.diff(times_ns[order]) > 0, times_ns.size > 0)
+            kept = order[last[: order.size]]
+            found.append(
+                StampedSamples(channels=one.stream.channels, times_ns=times_ns[kept], values=values[:, kept])
+            )
+        return tuple(found)
 
     def first_pass(self) -> "FirstPass":
         """Read stamps alone and fit the time bases: all that must be known before blocks can be given."""

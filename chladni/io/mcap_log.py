@@ -15,7 +15,7 @@ from chladni.io.clock.shared_clocks import Key, StreamClock, clocks_of
 from chladni.io.gathering import LostMessages, gather
 from chladni.io.log import Log
 from chladni.io.log_info import LogInfo, oddities, unread_sentences
-from chladni.io.log_reader import FirstPass, LogReader, SampleGrid, Window
+from chladni.io.log_reader import FirstPass, LogReader, SampleGrid, StampedSamples, Window
 from chladni.io.log_survey import survey
 from chladni.io.loss import Loss, Unread, losses
 from chladni.io.mcap.container import McapContainer
@@ -23,6 +23,7 @@ from chladni.io.mcap.limits import Limits
 from chladni.io.setup import Setup
 from chladni.io.stamps import StampRequest
 from chladni.io.stream import Stream, read_pieces
+from chladni.io.topic_channels import NumberLists
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.geometry import Geometry
@@ -122,6 +123,11 @@ class McapLog(Log):
         return self._content.unread
 
     @property
+    def number_lists(self) -> tuple[NumberLists, ...]:
+        """Lists of numbers in messages, an element for each joint or motor, as in JointState."""
+        return self._content.number_lists
+
+    @property
     def _content(self) -> Catalog:
         if self._catalog is None:
             self._catalog = read_catalog(self._container, setup=self._setup, request=self._stamp)
@@ -137,6 +143,12 @@ class McapLog(Log):
     ) -> tuple[TimeSeries, ...]:
         """Read channels, one series for each sampling grid; see `Log.read_groups`."""
         return self._reader(paths, start_s, end_s).series(one_clock=one_clock)
+
+    def stamped(
+        self, paths: Sequence[str], *, start_s: float | None = None, end_s: float | None = None
+    ) -> tuple[StampedSamples, ...]:
+        """Read channels as they were stamped, on no grid; see `Log.stamped`."""
+        return self._reader(paths, start_s, end_s).stamped()
 
     def blocks(
         self,

@@ -14,6 +14,7 @@ from chladni.io.decoding import FieldInfo
 from chladni.io.decoding.columns import Column, Strings
 from chladni.io.decoding.schema import Dimension
 from chladni.io.field_selector import (
+    NAME_FIELDS,
     ElementChoice,
     FieldFilter,
     FieldSelector,
@@ -43,6 +44,44 @@ Names = TypeVar("Names", str, tuple[str, ...])
 
 FRAME_FIELDS: Final = ("header.frame_id", "frame_id")
 """Where messages say which of several sensors of one kind they come from."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NumberLists:
+    """Lists of numbers side by side in each message of a topic, with an element for each joint or motor.
+
+    Attributes
+    ----------
+    topic
+        How paths of it begin.
+    schema_name
+        Message type.
+    place
+        Where in a message: empty at its top, else such as ``desired`` or ``points[0]``.
+    names
+        What the elements are called: every distinct list of the first messages; empty where nothing names them.
+    named_in_message
+        Whether the names lie beside the lists, so that an element can be read by its name.
+    elements
+        How many elements each list has in the first messages, by its field.
+    """
+
+    topic: str
+    schema_name: str
+    place: str
+    names: tuple[tuple[str, ...], ...]
+    named_in_message: bool
+    elements: dict[str, int]
+
+    @property
+    def label(self) -> str:
+        """Topic, and the place in it where it isn't the top of the message or a trajectory's first point."""
+        return f"{self.topic}.{self.place}" if self.place and "[" not in self.place else self.topic
+
+    def path(self, field: str, element: int | str) -> str:
+        """Path of an element, by its number or its name."""
+        prefix = f"{self.topic}.{self.place}" if self.place else self.topic
+        return f"{prefix}.{field}{element_text(element) if isinstance(element, str) else f'[{element}]'}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -110,6 +149,39 @@ class TopicChannels:
     def element_names(self) -> frozenset[str]:
         """All names that the first messages give to elements of their arrays."""
         return frozenset(name for lists in self.joints.values() for names in lists for name in names)
+
+    def number_lists(self) -> Iterator[NumberLists]:
+        """Give the lists of numbers of its messages, those beside one another together."""
+        found: dict[str, dict[str, int]] = {}
+        beside: dict[str, str | None] = {}
+        for info in self.topic.fields if self.layout is None and has_signals(self.topic.schema_name) else ():
+            elements = self.elements.get(info.path) if is_signal(info) and info.dims else None
+            # Of a list of lists the first one.
+            inner = {indices[-1] for indices in elements or () if not any(indices[:-1])}
+            if inner:
+                place, _, field = info.path.replace("[]", "[0]").rpartition(".")
+                found.setdefault(place, {})[field] = max(inner) + 1
+                beside[place] = names_beside(info, self.topic.by_path)
+        for place, elements_of in found.items():
+            leaf = beside[place]
+            for prefix in self.publishers or (topic_text(self.topic.name),):
+                yield NumberLists(
+                    topic=prefix,
+                    schema_name=self.topic.schema_name,
+                    place=place,
+                    names=self._names_of_message() if leaf is None else self.joints.get(leaf, ()),
+                    named_in_message=leaf is not None,
+                    elements=elements_of,
+                )
+
+    def _names_of_message(self) -> tuple[tuple[str, ...], ...]:
+        """Names at the top of the messages, of lists that lie deeper."""
+        for name in NAME_FIELDS:
+            info = self.topic.by_path.get(name)
+            if info is not None and info.kind == "string" and len(info.dims) == 1:
+                columns = [part.columns[name].select(~part.bad) for part in self.topic.decode_head([name])]
+                return _recurring([names for column in columns for names in _lists(column.strings)])
+        return ()
 
     def may_hold(self, source: ChannelSource) -> bool:
         """Whether the first messages have the elements that a channel names."""
@@ -201,7 +273,12 @@ class TopicChannels:
             return
         for indices in elements:
             selector = FieldSelector(leaf=info, elements=indices, names_leaf=names_leaf)
-            yield self._listed(_with_indices(info.path, indices), self._with_name(selector, self._names_at(selector)))
+            selector = self._with_name(selector, self._names_at(selector))
+            written = None if selector.called is None else f"{info.path}{element_text(selector.called)}"
+            # What was written under its name is listed so: its unit is kept under that.
+            kept = measured_fields(self.topic.metadata) or frozenset()
+            path = written if written is not None and written in kept else _with_indices(info.path, indices)
+            yield self._listed(path, selector)
 
     def _called(self, selector: FieldSelector, path: MessagePath) -> FieldSelector:
         """Say what the names call the element at an index.

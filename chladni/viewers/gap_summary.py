@@ -13,6 +13,8 @@ LIKELY, PROBABLE = 0.9, 0.6
 FAINT = 3.0
 # Candidates that are named when none explains the gap.
 NEAREST = 3
+# Causes that one sentence holds.
+_IN_A_SENTENCE = 4
 # Of what closes on the first log, the share below which little carries over to another.
 CARRIED = 0.5
 # Of what any force at a place explains, the share above which a law that follows the motion there does it.
@@ -93,6 +95,10 @@ def _effects(found: Diagnosis) -> Iterator[str]:
     if len(causes) == 1:
         (cause,) = causes
         yield f"{_certainty(cause)} {cause_phrase(cause)} ({chance(cause.probability)})."
+    elif len(causes) > _IN_A_SENTENCE:
+        sites = list(dict.fromkeys(cause.site for cause in causes))
+        yield f"{len(causes)} causes at {len(sites)} sites: {_listed(sites)}."
+        yield from _by_site(causes)
     else:
         # Two names are as sure as the less sure one.
         least = min(causes, key=lambda cause: cause.probability)
@@ -104,6 +110,17 @@ def _effects(found: Diagnosis) -> Iterator[str]:
     yield from _faint(found)
     for cause in causes:
         yield from _reservations(cause)
+
+
+def _by_site(causes: Sequence[Cause]) -> Iterator[str]:
+    """A sentence a site."""
+    for site in dict.fromkeys(cause.site for cause in causes):
+        told = [
+            f"{cause_phrase(cause).replace(f' at {site}', '')} ({chance(cause.probability)})"
+            for cause in causes
+            if cause.site == site
+        ]
+        yield f"{site}: {_listed(told)}."
 
 
 def _any_law(found: Diagnosis) -> Iterator[str]:
@@ -155,6 +172,9 @@ def _closing(found: Diagnosis) -> str:
 
 def _shares(found: Diagnosis) -> Iterator[str]:
     """What each of several causes is worth beside the others."""
+    if len(found.causes) > _IN_A_SENTENCE:
+        # Tables hold them.
+        return
     told = [
         f"without {effect_at(cause.effect, cause.site)} {percent(cause.share)} of it"
         for cause in found.causes
@@ -278,6 +298,8 @@ def _how(gap: Closing) -> Iterator[str]:
     """How the closing was measured, where it wasn't by free run."""
     if gap.by == "cross_sensor":
         yield "The cause isn't among the log's inputs: the closing is that of each sensor predicted from the others."
+    elif gap.by == "torque":
+        yield "Errors are those of the joints' torques: what the drives give against what the motion needs."
     elif gap.by == "windows" and gap.horizon_s is not None:
         span = engineering(gap.horizon_s, None, "s")
         yield f"Errors are those of windows of {span}, each from an estimated state; beyond, they drift apart."

@@ -248,3 +248,39 @@ def test_a_signalling_nan_is_missing_without_a_warning(tmp_path: Path) -> None:
     with open_log(tmp_path / "a.mcap") as log:
         log.info()
         assert np.flatnonzero(np.isnan(log.read(["/a.x", "/a.y"]).values[0])).tolist() == [3, 70]
+
+
+def test_lists_of_numbers_are_told_with_their_names_and_how_many_they_are(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    with LogMaker(path) as maker:
+        joints = maker.ros2("/joints", "sensor_msgs/msg/JointState", JOINT_STATE)
+        bare = maker.ros2("/bare", "test/msg/Grid", GRID)
+        for index in range(20):
+            stamp_ns = START_NS + index * STEP_NS
+            maker.write(joints, joint_state(stamp_ns, ["a", "b"], [1.0, 2.0], effort=[3.0]), stamp_ns)
+            maker.write(bare, {"rows": [{"pair": [0.0, 1.0], "more": [index]}], "x": 0.0}, stamp_ns)
+    with open_log(path) as log:
+        first, second = log.number_lists
+    assert (first.topic, first.place, first.label, first.names) == ("/joints", "", "/joints", (("a", "b"),))
+    assert (first.elements, first.named_in_message) == ({"position": 2, "effort": 1}, True)
+    assert (first.path("position", 1), first.path("position", "b")) == ("/joints.position[1]", "/joints.position[b]")
+    assert (second.place, second.names, second.elements) == ("rows[0]", (), {"pair": 2, "more": 1})
+    assert (second.label, second.path("pair", 1)) == ("/bare", "/bare.rows[0].pair[1]")
+
+
+def test_events_are_read_as_they_were_stamped(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    stamps_ns = START_NS + np.array([0, 9, 3, 3, 40]) * STEP_NS
+    with LogMaker(path) as maker:
+        channel = maker.ros2("/joints", "sensor_msgs/msg/JointState", JOINT_STATE)
+        for value, stamp_ns in enumerate(stamps_ns.tolist()):
+            maker.write(channel, joint_state(stamp_ns, ["a", "b"], [value, -value]), stamp_ns)
+    with open_log(path) as log:
+        (found,) = log.stamped(["/joints.position[1]", "/joints.position[0]"])
+        (part,) = log.stamped(["/joints.position[0]"], start_s=0.02, end_s=0.1)
+    # Of two with one stamp the later one counts.
+    np.testing.assert_array_equal(found.times_ns, START_NS + np.array([0, 3, 9, 40]) * STEP_NS)
+    rows = {channel.name: values.tolist() for channel, values in zip(found.channels, found.values, strict=True)}
+    assert rows["/joints.position[0]"] == [0.0, 3.0, 1.0, 4.0]
+    assert rows["/joints.position[1]"] == [0.0, -3.0, -1.0, -4.0]
+    assert part.values.tolist() == [[3.0, 1.0]]

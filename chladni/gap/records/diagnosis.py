@@ -6,6 +6,7 @@ from typing import Literal
 
 from chladni.gap.calibration import COVERAGE
 from chladni.gap.records.log_use import LogUse
+from chladni.robots.machine import Machine
 from chladni.signals.arrays import Real
 from chladni.signals.value import Value, require_shape
 
@@ -218,7 +219,8 @@ class Closing:
     held_out
         The samples.
     by
-        ``free_run``, ``windows`` (each from an estimated state, see `horizon_s`) or ``cross_sensor``.
+        ``free_run``, ``windows`` (each from an estimated state, see `horizon_s`), ``cross_sensor``, or ``torque``
+        that the motion of a robot's joints needs.
     horizon_s
         Length of a window, None in free run.
     explained
@@ -233,7 +235,7 @@ class Closing:
     closed: float | None
     interval: tuple[float, float] | None
     held_out: tuple[HeldOut, ...]
-    by: Literal["free_run", "windows", "cross_sensor"] = "free_run"
+    by: Literal["free_run", "windows", "cross_sensor", "torque"] = "free_run"
     horizon_s: float | None = None
     explained: float | None = None
 
@@ -394,6 +396,8 @@ class Diagnosis:
         Of the tuned parameters' errors; None where nothing was tuned.
     any_law
         Where something is left: what a law of the motion at one place would explain, whatever its name.
+    machine
+        Of a robot: its description with what was found, to be simulated or written; None of a model.
     answer_set, coverage
         Effects and sites that together hold the truth with this probability; empty where nothing was weighed.
     """
@@ -419,6 +423,7 @@ class Diagnosis:
     left: Where | None = None
     correlation: Correlation | None = None
     any_law: AnyLaw | None = None
+    machine: Machine | None = None
     answer_set: tuple[Candidate, ...] = ()
     coverage: float = COVERAGE
 

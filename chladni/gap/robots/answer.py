@@ -1,0 +1,396 @@
+"""From the torques that were explained to the records of a diagnosis."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from chladni.gap.calibration import CLOSE, COVERAGE, LAPSE, LEAST_SHARE, NAMED, TEMPER
+from chladni.gap.comparison.shares import band_shares, gap_map, regime_shares, relative_residual
+from chladni.gap.comparison.time_shares import time_shares
+from chladni.gap.records.diagnosis import (
+    PARAMETER,
+    Candidate,
+    Cause,
+    ChannelGap,
+    Closing,
+    Diagnosis,
+    FittedNumber,
+    GapSignals,
+    HeldOut,
+    Ranked,
+    SiteShare,
+    Verdict,
+    Where,
+)
+from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.forward import confirmed, machine_of
+from chladni.gap.robots.remarks import remarks_on
+from chladni.gap.robots.search import alternatives
+from chladni.gap.robots.solved import Solved
+from chladni.gap.robots.torques import Torques
+from chladni.gap.robots.words import Term
+from chladni.robots.dynamics import inertial_numbers
+from chladni.signals.arrays import Mask, Real
+
+#: Others that are weighed in place of each cause, and blocks of the log of which every other one judges.
+_OTHERS, _BLOCKS = 6, 16
+#: Samples that lie farther apart than so many intervals are of two stretches.
+_GAP = 1.5
+#: Deviations beyond which a number is told.
+_SIGMAS = 2.0
+#: Of its share where it acts most: joints with less don't tell of it.
+_ACTS = 0.1
+#: What a description states and a joint may have less of: then it's a value that is wrong.
+_STATED = {"coulomb_friction": "frictionloss", "viscous_friction": "damping", "armature": "armature"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer:
+    """The records of what was found on one log."""
+
+    solved: Solved
+
+    @property
+    def _contest(self) -> Contest:
+        return self.solved.contest
+
+    @property
+    def _best(self) -> Fit:
+        return self.solved.best
+
+    @cached_property
+    def weighed(self) -> tuple["Weighed", ...]:
+        """Each term of the best set, by falling probability."""
+        found = [_weighed(self.solved, place) for place in range(len(self._best.terms))]
+        return tuple(sorted(found, key=lambda one: (-one.probability, -one.share)))
+
+    @cached_property
+    def named(self) -> tuple["Weighed", ...]:
+        """Those that torques name, where a simulation with them doesn't deny it."""
+        return () if self.denied is not None else self._suggested
+
+    @cached_property
+    def denied(self) -> Closing | None:
+        """What simulation says of the names that torques suggest, when it's no better with them than without."""
+        found = simulated_closing(self.solved, [one.term for one in self._suggested]) if self._suggested else None
+        return found if found is not None and (found.after > found.tuned or found.after > 1.0) else None
+
+    @cached_property
+    def _suggested(self) -> tuple["Weighed", ...]:
+        """Those that are more probable than not, and explain more than rounding."""
+        return tuple(
+            one for one in self.weighed if one.probability >= NAMED and one.share >= LEAST_SHARE and one.is_told
+        )
+
+    @cached_property
+    def unexplained(self) -> tuple[int, ...]:
+        """Rows of joints at which something acts that no word explains."""
+        # Where a term isn't named, what it stands for is unknown.
+        doubted = {row for one in self.weighed if one not in self.named for row in one.acts}
+        beyond = np.flatnonzero(self._contest.unknowns(self._best) > TEMPER)
+        named = {row for one in self.named for row in one.acts}
+        return tuple(sorted({*beyond.tolist(), *(doubted - named)}))
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """A name, a value, nothing, or something without a name."""
+        if self.named:
+            return "parameters" if all(one.candidate.effect == PARAMETER for one in self.named) else "effect"
+        return "unknown" if self.unexplained or self.denied is not None else "none"
+
+    @cached_property
+    def closing(self) -> Closing:
+        """How far the gap closes: of positions, simulated from the log's poses; of torques where runs go astray."""
+        named = [one.term for one in self.named]
+        return simulated_closing(self.solved, named) or closing_of(self.solved, named)
+
+    def diagnosis(self) -> Diagnosis:
+        """Give the record."""
+        solved = self.solved
+        joints = [solved.torques.joints[row].name for row in self.unexplained]
+        return Diagnosis(
+            model=solved.torques.robot.name,
+            logs=(solved.torques.log.log,),
+            verdict=self.verdict,
+            causes=tuple(one.cause for one in self.named),
+            ranking=tuple(_ranking(self.weighed)),
+            where=_where(solved, self._contest.nothing),
+            left=_where(solved, self._best) if self.verdict == "unknown" else None,
+            gap=self.closing,
+            tuned_parameters=tuned_parameters(solved),
+            remarks=remarks_on(solved, joints if self.named else ()),
+            advice=_advice(self.verdict, joints, self.denied),
+            signals=_signals(solved),
+            machine=machine_of(self._contest, self._contest.fit([one.term for one in self.named])),
+            answer_set=tuple(dict.fromkeys(each for one in self.weighed for each in (one.candidate, *one.others))),
+            coverage=COVERAGE,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weighed:
+    """A term with its probability.
+
+    Attributes
+    ----------
+    term, candidate
+        The term, and what it's called.
+    acts
+        Rows of the joints that it changes.
+    is_told
+        Whether its first number is beyond its uncertainty, and not at the edge of what it can be.
+    nats
+        That it's worth beside the others.
+    """
+
+    term: Term
+    candidate: Candidate
+    probability: float
+    share: float
+    acts: tuple[int, ...]
+    group: tuple[str, ...]
+    others: tuple[Candidate, ...]
+    parameters: dict[str, FittedNumber]
+    is_told: bool
+    nats: float
+
+    @property
+    def cause(self) -> Cause:
+        """The record."""
+        return Cause(
+            effect=self.candidate.effect,
+            site=self.candidate.site,
+            probability=self.probability,
+            group=self.group,
+            alternatives=self.others,
+            parameters=self.parameters,
+            variant=self.term.variant if self.term.word == "encoder_offset" else None,
+            share=self.share,
+        )
+
+
+def _weighed(solved: Solved, place: int) -> Weighed:
+    contest, best = solved.contest, solved.best
+    term = best.terms[place]
+    rest = contest.fit([*best.terms[:place], *best.terms[place + 1 :]], best)
+    # A law that holds this one as a special case, and needs no more of it, says the same.
+    found = alternatives(contest, best, place, _OTHERS)
+    others = [found[0], *(one for one in found[1:] if not one.terms[-1].holds(term) or one.nats > best.nats)]
+    # What is unknown elsewhere is so with the term, too.
+    free = [float(np.sum(np.maximum(contest.unknowns(one), 0.0))) for one in (rest, best)]
+    unknown = rest.nats + free[0] - free[1]
+    nats = np.array([best.nats, rest.nats, unknown, *(one.nats for one in others[1:])])
+    weight = np.exp((nats - nats.max()) / TEMPER)
+    # The same word at sites that the log can't tell from this one is no doubt of the word.
+    near = [one.terms[-1] for one in others[1:] if one.nats > best.nats - CLOSE]
+    same = sum(
+        float(part)
+        for one, part in zip(others[1:], weight[3:], strict=True)
+        if one.terms[-1].word == term.word and one.terms[-1] in near
+    )
+    shares = contest.shares(best, place)
+    acts = np.flatnonzero(shares > _ACTS * np.max(shares))
+    candidate = _candidate(solved, place)
+    return Weighed(
+        term=term,
+        candidate=candidate,
+        probability=(1.0 - LAPSE) * (float(weight[0]) + same) / float(np.sum(weight)),
+        share=float(min(np.max(shares), 1.0)),
+        acts=tuple(int(row) for row in (term.rows or acts)),
+        group=tuple(dict.fromkeys([candidate.site, *(one.site for one in near if one.word == term.word)])),
+        others=tuple(
+            dict.fromkeys(Candidate(effect=one.word, site=one.site) for one in near if one.word != term.word)
+        ),
+        parameters=_parameters(solved, place, candidate),
+        is_told=_is_told(best, place),
+        nats=best.nats - max(rest.nats, unknown),
+    )
+
+
+def _is_told(best: Fit, place: int) -> bool:
+    values, deviations = best.values(place)
+    term = best.terms[place]
+    moved = values - term.nominal
+    # A payload or a tilt may be told by any of its numbers.
+    told = (np.abs(moved) > _SIGMAS * deviations) & (moved > term.least + 1e-3 * term.scale)
+    return bool(told[0] if term.rows else np.any(told))
+
+
+def _candidate(solved: Solved, place: int) -> Candidate:
+    """What a term is called: less friction, damping or armature than the description has is a wrong value of it."""
+    term = solved.best.terms[place]
+    if term.word in _STATED and len(term.rows) < _PAIR and solved.best.values(place)[0][0] < term.nominal[0]:
+        return Candidate(effect=PARAMETER, site=f"{term.site}.{_STATED[term.word]}")
+    return Candidate(effect=term.word, site=term.site)
+
+
+def _parameters(solved: Solved, place: int, candidate: Candidate) -> dict[str, FittedNumber]:
+    term, numbers = solved.best.terms[place], solved.numbers(place)
+    if term.word == PARAMETER:
+        link = solved.torques.robot.links.index(term.site.removesuffix(".mass"))
+        mass = float(inertial_numbers(solved.torques.robot)[link, 0])
+        ((value, deviation, unit),) = numbers.values()
+        return {"value": FittedNumber(value=mass * (1.0 + value), std=mass * deviation, unit=unit, nominal=mass)}
+    nominal = None if term.word not in _STATED else float(term.nominal[0])
+    if candidate.effect == PARAMETER:
+        ((value, deviation, unit),) = numbers.values()
+        return {"value": FittedNumber(value=value, std=deviation, unit=unit, nominal=nominal)}
+    return {
+        name: FittedNumber(value=value, std=deviation if np.isfinite(deviation) else None, unit=unit, nominal=nominal)
+        for name, (value, deviation, unit) in numbers.items()
+    }
+
+
+def tuned_parameters(solved: Solved) -> dict[str, FittedNumber]:
+    """Give what moved within its tolerance: masses of the links, N of their spread."""
+    contest, best, robot = solved.contest, solved.best, solved.torques.robot
+    numbers, found = inertial_numbers(robot), {}
+    deviations = np.sqrt(np.diag(best.covariance))
+    for place, name in enumerate(contest.tolerated):
+        link, _, what = name.rpartition(".")
+        if what != "mass":
+            continue
+        mass = float(numbers[robot.links.index(link), 0])
+        spread = robot.tolerance.inertia * mass
+        std = float(deviations[place])
+        found[name] = FittedNumber(
+            value=mass + spread * float(best.numbers[place]), unit="kg", nominal=mass,
+            # What a log doesn't narrow down stays as wide as its tolerance.
+            std=spread * std if std < _NARROWED else None,
+        )  # fmt: skip
+    return found
+
+
+#: Rows of a law between two joints.
+_PAIR = 2
+#: Of its tolerance: a number that stays wider isn't told by the log.
+_NARROWED = 0.9
+
+
+def _ranking(weighed: Sequence[Weighed]) -> Iterator[Ranked]:
+    for one in weighed:
+        yield Ranked(effect=one.candidate.effect, site=one.candidate.site, probability=one.probability, gap=None,
+                     log_evidence=one.nats)  # fmt: skip
+
+
+def _where(solved: Solved, fit: Fit) -> Where:
+    torques = solved.torques
+    residual, drive = torques.missing - solved.contest.explained(fit), torques.drive
+    power = np.mean(relative_residual(residual, drive) ** 2, axis=1)
+    shares = power / power.sum() if power.sum() > 0 else power
+    rate = torques.rate_hz
+    names = [one.name for one in torques.joints]
+    rms = np.sqrt(np.mean(drive**2, axis=1))
+    regimes = {f"{name}.velocity": row for name, row in zip(names, torques.velocity, strict=True)}
+    return Where(
+        channels=tuple(
+            ChannelGap(name=name, gap=float(np.sqrt(np.mean(row**2)) / size), noise=float(noise / size),
+                       noise_from="what encoders (and effort sensors) round and shake by")
+            for name, row, size, noise in zip(names, residual, rms, torques.noise, strict=True)
+        ),
+        bands=band_shares(residual, drive, sample_rate_hz=rate),
+        sites=tuple(
+            SiteShare(name=name, share=float(share))
+            for share, name in sorted(zip(shares, names, strict=True), key=lambda one: -one[0])
+        ),
+        regimes=tuple(replace(one, unit="rad/s") for one in regime_shares(residual, drive, regimes)),
+        times=time_shares(residual, drive, sample_rate_hz=rate),
+    )  # fmt: skip
+
+
+def closing_of(solved: Solved, named: Sequence[Term]) -> Closing:
+    """How much of the missing torque the answer explains, on every other block of the log, which no fit saw."""
+    torques = solved.torques
+    judge = _every_other(torques.missing.shape[1])
+    there = torques.moving & judge
+    apart = Contest(torques, taking_part=~judge)
+    forms = {(term.word, term.site, term.variant): term for term in apart.terms}
+    chosen = [forms[term.word, term.site, term.variant] for term in named]
+    nominal, tuned, full = np.zeros_like(torques.missing), *(apart.explained(apart.fit(one)) for one in ((), chosen))
+    scale = np.sqrt(np.mean(torques.drive**2, axis=1))[:, None]
+
+    def left(part: Real) -> float:
+        return float(np.sqrt(np.mean((((torques.missing - part) / scale)[there]) ** 2)))
+
+    before, after, noise = left(nominal), left(full), float(np.sqrt(np.mean((torques.noise[:, None] / scale) ** 2)))
+    room, tuned_left = before - noise, left(tuned)
+    stretches = _held_out(torques, torques.log.time_s[torques.kept][judge], torques.rate_hz)
+    return Closing(
+        before=before, tuned=tuned_left, after=after, noise=noise,
+        closed=float(np.clip((before - after) / room, 0.0, 1.0)) if room > noise else None,
+        interval=None, held_out=stretches, by="torque",
+        explained=float(np.clip((tuned_left**2 - after**2) / (tuned_left**2 - noise**2), 0.0, 1.0))
+        if named and tuned_left > 2.0 * noise else None,
+    )  # fmt: skip
+
+
+def simulated_closing(solved: Solved, named: Sequence[Term]) -> Closing | None:
+    """How far simulated positions come to the measured ones, over the motion; None where runs go astray."""
+    contest, torques = solved.contest, solved.torques
+    tuned, found = (confirmed(Solved(contest=contest, best=contest.fit(terms))) for terms in ((), tuple(named)))
+    if tuned is None or found is None or not np.all(np.isfinite([found.before, tuned.after, found.after])):
+        return None
+    moves = np.isfinite(found.per_joint_after)
+    noise = float(np.sqrt(np.mean((torques.reading_noise[moves] / found.motion[moves]) ** 2)))
+    room = found.before - noise
+    told = named and tuned.after > 2.0 * noise
+    stretches = _held_out(torques, found.time_s[found.judged], torques.log.sample_rate_hz)
+    return Closing(
+        before=found.before, tuned=tuned.after, after=found.after, noise=noise,
+        closed=float(np.clip((found.before - found.after) / room, 0.0, 1.0)) if room > noise else None,
+        interval=None, held_out=stretches if found.held_out else (),
+        by="windows", horizon_s=found.horizon_s,
+        explained=float(np.clip((tuned.after**2 - found.after**2) / (tuned.after**2 - noise**2), 0.0, 1.0))
+        if told else None,
+    )  # fmt: skip
+
+
+def _held_out(torques: Torques, at_s: Real, rate_hz: float) -> tuple[HeldOut, ...]:
+    breaks = np.flatnonzero(np.diff(at_s) > _GAP / rate_hz)
+    edges = [-1, *breaks.tolist(), at_s.size - 1]
+    return tuple(
+        HeldOut(log=torques.log.log, start_s=float(at_s[a + 1]), end_s=float(at_s[b])) for a, b in pairwise(edges)
+    )
+
+
+def _every_other(count: int) -> Mask:
+    return np.asarray(np.arange(count) * _BLOCKS // count % 2 == 1)
+
+
+def _signals(solved: Solved) -> GapSignals:
+    """Torques of the drives beside what the motion needs: as described, and with what was found."""
+    torques, contest = solved.torques, solved.contest
+    after = torques.drive - (torques.missing - contest.explained(solved.best))
+    rate = torques.rate_hz
+    lines = torques.drive.shape[1] // 2 + 1
+    time_s, frequency_hz, density = gap_map(torques.missing, torques.drive, rate)
+    return GapSignals(
+        log=torques.log.log,
+        sample_rate_hz=rate,
+        output_names=tuple(one.name for one in torques.joints),
+        output_units=tuple("N m" if one.kind == "hinge" else "N" for one in torques.joints),
+        measured=torques.drive,
+        before=torques.wanted,
+        after=after,
+        noise_rms=torques.noise,
+        noise_density=np.repeat((torques.noise**2 / (rate / 2.0))[:, None], lines, axis=1),
+        map_time_s=time_s,
+        map_frequency_hz=frequency_hz,
+        gap_map=density,
+        gap_map_after=gap_map(torques.drive - after, torques.drive, rate)[2],
+    )
+
+
+def _advice(verdict: Verdict, joints: Sequence[str], denied: Closing | None) -> str | None:
+    if verdict != "unknown":
+        return None
+    if denied is not None:
+        return (
+            "What the torques suggest isn't named: simulated with it, the positions' error is "
+            f"{100 * denied.after:.3g} % of the motion, without it {100 * denied.tuned:.3g} %."
+        )
+    listed = ", ".join(joints)
+    return f"At {listed} a torque is missing that no word explains: look there first, at several speeds and loads."

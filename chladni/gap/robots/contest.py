@@ -1,0 +1,254 @@
+"""Fits of sets of terms to the missing torque of all joints at once, and their evidence."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import comb, log, log1p
+
+import numpy as np
+
+from chladni.gap.calibration import ANOTHER, DETAILS, ELSEWHERE, USUAL
+from chladni.gap.records.diagnosis import PARAMETER
+from chladni.gap.robots.torques import Torques
+from chladni.gap.robots.words import Term, all_terms, tolerances
+from chladni.signals.arrays import Index, Mask, Real
+
+#: Share by which the noise of a torque is known.
+_DOUBT = 0.3
+_ROUNDS, _NEAR = 8, 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointLeft:
+    """What a fit leaves at a joint, as whitened energy; noise alone leaves `count`.
+
+    Attributes
+    ----------
+    energy, count
+        Left, and expected of noise alone.
+    force
+        Energy that the joint's own laws explain: these idealise a part of it. None without any, infinite for a torque
+        of any shape.
+    """
+
+    energy: float
+    count: float
+    force: float | None
+
+    @property
+    def over_noise(self) -> float:
+        """Energy over the noise's."""
+        return self.energy / max(self.count, 1.0)
+
+    @property
+    def beyond(self) -> float:
+        """Energy beyond the noise's."""
+        return max(self.energy - self.count, 0.0)
+
+    @property
+    def log_likelihood(self) -> float:
+        """Nats, by the evidence of every diagnosis (`Left`).
+
+        What is left beyond the noise is worth few numbers as far as it's the usual detail of the joint's own laws,
+        and many beyond. Where one ends the other begins as flat, so that there's one best fit.
+        """
+        # The square of a real number costs half of a complex line's; of the noise's own level little is told.
+        beyond, doubted = self.beyond / 2.0, _DOUBT * self.count / 2.0
+        told = beyond**2 / (beyond + doubted) if beyond > 0 else 0.0
+        inside = min(told, self._usual)
+        nats = DETAILS * log1p(inside / DETAILS)
+        if told > inside:
+            nats += ELSEWHERE * log1p((told - inside) / (ELSEWHERE * (1.0 + inside / DETAILS)))
+        return -nats
+
+    @property
+    def _usual(self) -> float:
+        return 0.0 if self.force is None else USUAL**2 * self.force / 2.0
+
+    @property
+    def weight(self) -> float:
+        """Times that a unit of energy costs as much as of noise alone."""
+        beyond = self.beyond / 2.0
+        inside = min(beyond, self._usual)
+        flat = 1.0 + inside / DETAILS
+        return 1.0 / (flat + (beyond - inside) / ELSEWHERE)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """A set of terms with its best numbers.
+
+    Attributes
+    ----------
+    terms
+        The set.
+    numbers, covariance
+        ``[number]`` of the tolerances first, then of the terms, over their scales; and their covariance.
+    left
+        ``[joint]``: what is left at each.
+    nats
+        Evidence and prior.
+    """
+
+    terms: tuple[Term, ...]
+    numbers: Real
+    covariance: Real
+    left: tuple[JointLeft, ...]
+    nats: float
+    within: int
+    weight: Real
+
+    def values(self, place: int) -> tuple[Real, Real]:
+        """Numbers of a term and their standard deviations, SI, nominal included."""
+        first = self.within + sum(len(one.scale) for one in self.terms[:place])
+        term = self.terms[place]
+        rows = slice(first, first + len(term.scale))
+        deviation = np.sqrt(np.maximum(np.diag(self.covariance)[rows], 0.0))
+        return term.nominal + self.numbers[rows] * term.scale, deviation * term.scale
+
+
+class Contest:
+    """Terms of one log, whitened, so that sets of them are fitted by small matrices."""
+
+    def __init__(
+        self, torques: Torques, left_out: frozenset[str] = frozenset(), taking_part: Mask | None = None
+    ) -> None:
+        self.torques = torques
+        self.terms = [term for term in all_terms(torques) if term.word not in left_out]
+        inside, self.tolerated = tolerances(torques)
+        self.within = len(inside)
+        blocks = [inside, *(term.columns * term.scale[:, None, None] for term in self.terms)]
+        there = torques.moving if taking_part is None else torques.moving & taking_part
+        weight = np.sqrt(torques.numbers_a_sample) * there / torques.noise[:, None]
+        columns = np.concatenate(blocks) * weight
+        missing = torques.missing * weight
+        self.count = torques.numbers_a_sample * np.sum(there, axis=1)
+        self._blocks = np.concatenate(blocks)
+        self._gram = np.einsum("pjk,qjk->jpq", columns, columns, optimize=True)
+        self._right = np.einsum("pjk,jk->jp", columns, missing)
+        self._energy = np.sum(missing**2, axis=1)
+        self._start = 1.0 / (1.0 + np.maximum(self._energy - self.count, 0.0) / np.maximum(self.count, 1.0))
+        starts = np.cumsum([self.within, *(len(term.scale) for term in self.terms)])
+        self._places = {
+            id(term): np.arange(a, a + len(term.scale)) for term, a in zip(self.terms, starts, strict=False)
+        }
+        bounds = [term.least / term.scale for term in self.terms]
+        self._least = np.concatenate([np.full(self.within, -np.inf), *bounds])
+        self._words = Counter(term.word for term in {term.key: term for term in self.terms}.values())
+        # What tolerances alone leave.
+        self._before = self._energy
+        self.nothing = self.fit(())
+        self._before = np.array([one.energy for one in self.nothing.left])
+
+    def fit(self, terms: Sequence[Term], near: "Fit | None" = None) -> Fit:
+        """Fit a set: most probable numbers, each joint weighed by how far from its noise it is left.
+
+        Parameters
+        ----------
+        near
+            A fit of nearly the same set, whose weights are begun with.
+        """
+        chosen = self._chosen(terms)
+        gram, right = self._gram[:, chosen[:, None], chosen], self._right[:, chosen]
+        laws = self._laws(terms)
+        least = self._least[chosen]
+        weight = self._start if near is None else near.weight
+        for _ in range(_ROUNDS if near is None else _NEAR):
+            curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
+            numbers = _bounded(curvature, weight @ right, least)
+            left = self._left(gram, right, numbers, laws)
+            weight = np.array([one.weight for one in left])
+        curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
+        covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
+        known = sum(one.log_likelihood for one in left)
+        size = -0.5 * float(numbers @ numbers) - 0.5 * float(np.linalg.slogdet(curvature)[1])
+        return Fit(
+            terms=tuple(terms), numbers=numbers, covariance=covariance, left=left, within=self.within,
+            nats=known + size + self.prior(terms), weight=weight,
+        )  # fmt: skip
+
+    def again(self, fit: Fit) -> Fit:
+        """Fit a set of another contest, of the same words at the same sites."""
+        forms = {(term.word, term.site, term.variant): term for term in self.terms}
+        return self.fit([forms[term.word, term.site, term.variant] for term in fit.terms])
+
+    def prior(self, terms: Sequence[Term]) -> float:
+        """Nats of a set: each a cause of its own, or a word at several sites, as far as that is less."""
+        nats = 0.0
+        every = log(len({term.key for term in self.terms}))
+        for word, count in Counter(term.word for term in terms).items():
+            alone = (log(ANOTHER) - every) * (count - 1)
+            shared = log(ANOTHER) - log(comb(self._words[word], count)) if count > 1 else -np.inf
+            nats += log(ANOTHER) - every + max(alone, shared)
+        # Tolerances allow for what values are usually wrong by: more is one thing more.
+        nats += log(ANOTHER) * sum(term.word == PARAMETER for term in terms)
+        # A law that holds a simpler one, with another number, is one thing more.
+        return nats + log(ANOTHER) * sum(len(term.scale) - 1 for term in terms if term.rows)
+
+    def _laws(self, terms: Sequence[Term]) -> list[Index]:
+        """Places among the fitted numbers of each joint's own laws."""
+        found: list[list[int]] = [[] for _ in self.torques.joints]
+        place = self.within
+        for term in terms:
+            for row in term.rows:
+                found[row] += range(place, place + len(term.numbers))
+            place += len(term.numbers)
+        return [np.array(one, dtype=np.intp) for one in found]
+
+    def _left(self, gram: Real, right: Real, numbers: Real, laws: Sequence[Index]) -> tuple[JointLeft, ...]:
+        energy = self._energy - 2.0 * right @ numbers + np.einsum("p,jpq,q->j", numbers, gram, numbers)
+        found = []
+        for row, places in enumerate(laws):
+            own = numbers[places] @ gram[row][np.ix_(places, places)] @ numbers[places]
+            # Neither a law that is undone by tolerances nor one that adds nothing has details.
+            force = max(min(float(own), float(self._before[row] - energy[row])), 0.0) if places.size else None
+            found.append(JointLeft(energy=float(max(energy[row], 0.0)), count=float(self.count[row]), force=force))
+        return tuple(found)
+
+    def promise(self, fit: Fit) -> list[tuple[float, Term]]:
+        """Give what each further term would bring at about, nats, with the joints weighed as in a fit."""
+        weight = np.array([one.weight for one in fit.left])
+        chosen = self._chosen(fit.terms)
+        gram = np.tensordot(weight, self._gram[:, :, chosen], 1)
+        rest = weight @ self._right - gram @ fit.numbers
+        found = []
+        for term in self.terms:
+            at = self._places[id(term)]
+            own = np.tensordot(weight, self._gram[:, at[:, None], at], 1) + np.eye(at.size)
+            own -= gram[at] @ fit.covariance @ gram[at].T
+            gain = rest[at] @ np.linalg.solve(own, rest[at]) - np.linalg.slogdet(own)[1]
+            found.append((0.5 * float(gain), term))
+        return sorted(found, key=lambda one: one[0], reverse=True)
+
+    def explained(self, fit: Fit) -> Real:
+        """Give ``[joint, coarse]``: missing torque that the numbers of a fit explain."""
+        return np.tensordot(fit.numbers, self._blocks[self._chosen(fit.terms)], 1)
+
+    def shares(self, fit: Fit, place: int) -> Real:
+        """Give ``[joint]``: power of what a term adds, over that of all that is missing there."""
+        first = self.within + sum(len(one.scale) for one in fit.terms[:place])
+        at = self._places[id(fit.terms[place])]
+        numbers = fit.numbers[first : first + at.size]
+        added = np.einsum("p,jpq,q->j", numbers, self._gram[:, at[:, None], at], numbers)
+        return np.asarray(added / np.maximum(self._energy, np.maximum(self.count, 1.0)))
+
+    def _chosen(self, terms: Sequence[Term]) -> Index:
+        return np.concatenate([np.arange(self.within), *(self._places[id(term)] for term in terms)])
+
+    def unknowns(self, fit: Fit) -> Real:
+        """Give ``[joint]``: nats that a torque of any shape there would bring beside a fit."""
+        alone = log(ANOTHER) - log(len(fit.left)) - DETAILS
+        return np.array([replace(one, force=np.inf).log_likelihood - one.log_likelihood + alone for one in fit.left])
+
+
+def _bounded(curvature: Real, right: Real, least: Real) -> Real:
+    """Solve for numbers of which some have a lower bound: those that would lie below are held at it, in turn."""
+    numbers = np.linalg.solve(curvature, right)
+    held = numbers < least
+    while np.any(numbers < least - 1e-12):
+        held |= numbers < least
+        free = ~held
+        numbers = np.where(held, least, 0.0)
+        rest = right[free] - curvature[np.ix_(free, held)] @ least[held]
+        numbers[free] = np.linalg.solve(curvature[np.ix_(free, free)], rest)
+    return np.asarray(numbers)

@@ -1,0 +1,59 @@
+"""The whole diagnosis of a robot and its log."""
+
+from collections.abc import Callable
+
+from chladni.gap.records.diagnosis import Diagnosis
+from chladni.gap.robots.answer import Answer
+from chladni.gap.robots.solved import solved
+from chladni.gap.robots.torques import torques_of
+from chladni.robots.joint_log import JointLog
+from chladni.robots.robot import Robot
+from chladni.signals.linear_algebra import in_one_thread
+
+StepProgress = Callable[[str, float], None]
+
+#: Words of robots beside those of effects.md.
+ROBOT_WORDS = (
+    "armature", "controller_gain", "coulomb_friction", "delay", "encoder_offset", "gain_error", "gravity_tilt",
+    "joint_spring", "lag", "load_friction", "payload", "quadratic_damping", "saturation", "stribeck_friction",
+    "viscous_friction",
+)  # fmt: skip
+
+
+@in_one_thread()
+def diagnose_robot(
+    robot: Robot,
+    log: JointLog,
+    *,
+    leave_out: frozenset[str] = frozenset(),
+    progress: StepProgress | None = None,
+) -> Diagnosis:
+    """Say what a robot's description lacks, joint by joint.
+
+    The drives' torque (measured, or what the servos give for the commands) less the torque that the motion needs by
+    inverse dynamics is what is missing; words are columns of it, weighed all together by the evidence of every
+    diagnosis (docs/methods/robots.md).
+
+    Parameters
+    ----------
+    leave_out
+        Words that don't take part.
+    progress
+        Called with the name of the step and the share done.
+
+    Raises
+    ------
+    ModelError
+        When MuJoCo isn't installed, or nothing tells the torque of any joint.
+    LogError
+        When the log has no stretch that is long enough.
+    """
+    tell = progress or (lambda _step, _share: None)
+    tell("locating", 0.0)
+    torques = torques_of(robot, log)
+    tell("explaining", 0.2)
+    found = solved(torques, leave_out, lambda share: tell("explaining", 0.2 + 0.6 * share))
+    tell("measuring the closing", 0.9)
+    answer = Answer(solved=found).diagnosis()
+    tell("measuring the closing", 1.0)
+    return answer

@@ -1,0 +1,332 @@
+"""Confirmation by simulation: the description, and with what was found, run from the log's poses by its commands."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.solved import Solved
+from chladni.gap.robots.torques import ALL_COMMANDS, Torques
+from chladni.gap.robots.words import INERTIAL_NAMES, LOOP_S, Term, tolerated_inertia
+from chladni.robots.dynamics import inertial_numbers
+from chladni.robots.machine import Coupling, Machine, MachineJoint, as_described, physical
+from chladni.signals.arrays import Mask, Real
+
+#: Least length of the blocks of which every other one judges, in periods of the cutoff.
+_PERIODS = 16.0
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Confirmed:
+    """What simulation says of the description as it is, and with what was found.
+
+    Attributes
+    ----------
+    before, after
+        Error of the simulated positions over the motion, both RMS on the stretches held out, pooled over joints that
+        move; infinite where a run goes astray.
+    joints
+        Names.
+    per_joint_before, per_joint_after
+        ``[joint]``: the same of each; NaN where it doesn't move.
+    motion
+        ``[joint]``: RMS of the measured position about its mean, rad (m).
+    time_s
+        ``[sample]`` from the log's start.
+    measured, simulated_before, simulated_after
+        ``[joint, sample]`` positions; NaN where nothing was run.
+    judged
+        ``[sample]``: the stretches that judge.
+    horizon_s
+        How long a run lasts before it starts from the log's pose again.
+    held_out
+        Whether no fit saw what judges; False when the log is too short for that.
+    """
+
+    before: float
+    after: float
+    joints: tuple[str, ...]
+    per_joint_before: Real
+    per_joint_after: Real
+    motion: Real
+    time_s: Real
+    measured: Real
+    simulated_before: Real
+    simulated_after: Real
+    judged: Mask
+    horizon_s: float
+    held_out: bool
+
+
+def machine_of(contest: Contest, fit: Fit) -> Machine:
+    """Give the machine that a fit says the description stands for, as far as it holds together as one.
+
+    Numbers within their tolerances are set, too; inertias only as far as a body can have them.
+    """
+    return _Reading(contest, fit).machine()
+
+
+class _Reading:
+    """Reads a machine off the numbers of a fit."""
+
+    def __init__(self, contest: Contest, fit: Fit) -> None:
+        self._torques, self._fit, self._contest = contest.torques, fit, contest
+        self._robot = contest.torques.robot
+        described = as_described(self._robot)
+        self._described = {one.joint.name: one for one in described.joints}
+        self._joints = dict(self._described)
+        self._terms = [(term, fit.values(place)[0]) for place, term in enumerate(fit.terms)]
+        self._within = dict(zip(contest.tolerated, fit.numbers[: fit.within].tolist(), strict=True))
+
+    def machine(self) -> Machine:
+        for name in self._torques.log.joints:
+            self._set_within(name)
+        self._set_delays()
+        for term, values in self._terms:
+            law = _LAWS.get(term.word)
+            if law is not None and term.site in self._joints:
+                self._joints[term.site] = law(self._joints[term.site], term, values, self._torques)
+        for name in self._torques.log.joints:
+            self._set_drive(name)
+        tilts = [values for term, values in self._terms if term.word == "gravity_tilt"]
+        return Machine(
+            robot=self._robot,
+            joints=tuple(self._joints[one.name] for one in self._robot.joints),
+            inertial=self._inertial(),
+            tilt=(float(tilts[0][0]), float(tilts[0][1])) if tilts else (0.0, 0.0),
+            couplings=tuple(self._couplings()),
+        )
+
+    def _set_within(self, name: str) -> None:
+        """Set friction and armature within their tolerances."""
+        one, tolerance = self._joints[name], self._robot.tolerance
+        armature = one.armature * (1.0 + tolerance.inertia * self._within.get(f"{name}.armature", 0.0))
+        friction = one.friction + tolerance.friction * self._within.get(f"{name}.friction", 0.0)
+        self._joints[name] = replace(one, armature=armature, friction=friction)
+
+    def _set_delays(self) -> None:
+        late = {term.site: float(values[0]) for term, values in self._terms if term.word == "delay"}
+        common = late.get(ALL_COMMANDS, self._robot.delay_s)
+        for name in self._torques.log.joints:
+            delay_s = max(common + late.get(name, 0.0), 0.0)
+            self._joints[name] = replace(self._joints[name], delay_s=delay_s)
+
+    def _set_drive(self, name: str) -> None:
+        """Set the gains; what was found in units of torque that was asked, give in units of torque that arrives."""
+        one, described = self._joints[name], self._described[name]
+        found = {term.word: values for term, values in self._terms if term.site == name}
+        over_kp, kd_over_kp = found.get("controller_gain", np.array([1.0, 0.0]))
+        tolerance = self._robot.tolerance.gains
+        over_kp = float(over_kp) + tolerance * self._within.get(f"{name}.kp", 0.0)
+        kd_over_kp = float(kd_over_kp) + tolerance * self._within.get(f"{name}.kd", 0.0)
+        gain = 1.0 / float(found["gain_error"][0]) if "gain_error" in found else 1.0
+        share = gain / over_kp
+        one = replace(
+            one,
+            gain=gain,
+            friction=max(_towards(described.friction, one.friction, share), 0.0),
+            damping=max(_towards(described.damping, one.damping, share), 0.0),
+            armature=max(_towards(described.armature, one.armature, share), 0.0),
+            rise=share * one.rise, quadratic=share * one.quadratic, load=share * one.load,
+            stiffness=share * one.stiffness, torque=share * one.torque,
+        )  # fmt: skip
+        if one.servo is not None and (one.servo.kp or one.servo.kd):
+            kp, kd = (one.servo.kp or 0.0) / over_kp, (one.servo.kd or 0.0) * (1.0 + kd_over_kp / over_kp)
+            # What is read late by a part of the loop's period takes from the damping.
+            kd -= kp * LOOP_S * self._within.get("loop", 0.0)
+            one = replace(one, servo=replace(one.servo, kp=None if one.servo.kp is None else kp, kd=kd))
+        self._joints[name] = one
+
+    def _inertial(self) -> Real:
+        """``[link, 10]``: first what bodies can have for certain, then within tolerances as far as they can."""
+        found = inertial_numbers(self._robot)
+        spread = tolerated_inertia(self._robot)
+        for link, name in enumerate(self._robot.links):
+            own = found[link].copy()
+            for term, values in self._terms:
+                if term.word == "parameter" and term.site == f"{name}.mass":
+                    own *= max(1.0 + float(values[0]), 0.0)
+                if term.word == "payload" and term.site == name and values[0] > 0:
+                    own += _point(values)
+            change = np.array([self._within.get(f"{name}.{each}", 0.0) for each in INERTIAL_NAMES]) @ spread[link]
+            found[link] = physical(own, own + change) if own[0] > 0 else own
+        return found
+
+    def _couplings(self) -> Iterator[Coupling]:
+        for term, values in self._terms:
+            one, _, other = term.site.partition("~")
+            if not other or term.site in self._joints:
+                continue
+            number, dry = max(float(values[0]), 0.0), term.word == "coulomb_friction"
+            yield Coupling(
+                joints=(one, other), sense=1.0 if term.variant == "sum" else -1.0,
+                friction=number if dry else 0.0, damping=0.0 if dry else number,
+            )  # fmt: skip
+
+
+def _towards(described: float, found: float, share: float) -> float:
+    return described + share * (found - described)
+
+
+def _point(values: Real) -> Real:
+    """Numbers of a point mass with a first moment."""
+    mass, moment = float(values[0]), values[1:]
+    inertia = (moment @ moment * np.eye(3) - np.outer(moment, moment)) / mass
+    return np.concatenate([values, inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
+
+
+Law = Callable[[MachineJoint, Term, Real, Torques], MachineJoint]
+
+
+def _stribeck(one: MachineJoint, term: Term, values: Real, torques: Torques) -> MachineJoint:
+    row = torques.log.joints.index(one.joint.name)
+    speed = float(np.sqrt(np.mean(torques.velocity[row] ** 2)))
+    return replace(one, friction=float(values[0]), rise=float(values[1]), fading=float(str(term.variant)) * speed)
+
+
+def _saturation(one: MachineJoint, term: Term, _values: Real, _torques: Torques) -> MachineJoint:
+    limit = float(str(term.variant).split(" ", 1)[0])
+    return one if one.servo is None else replace(one, servo=replace(one.servo, limit=limit))
+
+
+def _offset(one: MachineJoint, term: Term, values: Real, _torques: Torques) -> MachineJoint:
+    if term.variant == "of the drive":
+        return replace(one, drive_reading=float(values[0]))
+    return replace(one, reading=float(values[0]))
+
+
+_LAWS: Mapping[str, Law] = {
+    "coulomb_friction": lambda one, _term, values, _: replace(one, friction=float(values[0])),
+    "viscous_friction": lambda one, _term, values, _: replace(one, damping=float(values[0])),
+    "quadratic_damping": lambda one, _term, values, _: replace(one, quadratic=float(values[0])),
+    "load_friction": lambda one, _term, values, _: replace(one, friction=float(values[0]), load=float(values[1])),
+    "stribeck_friction": _stribeck,
+    "joint_spring": lambda one, _term, values, _: replace(one, stiffness=float(values[0]), torque=float(values[1])),
+    "armature": lambda one, _term, values, _: replace(one, armature=float(values[0])),
+    "lag": lambda one, _term, values, _: replace(one, lag_s=max(float(values[0]), 0.0)),
+    "saturation": _saturation,
+    "encoder_offset": _offset,
+}
+
+
+def confirmed(solved: Solved) -> Confirmed | None:
+    """Run the description, and the machine that was found, from the log's poses by its commands.
+
+    Every other block of the log judges what was fitted to the rest. A run lasts a block where the drives hold
+    positions, and a period of the cutoff where torques or speeds are asked, since then nothing brings a joint back.
+
+    Returns
+    -------
+    Confirmed | None
+        None where the drive of a joint isn't known: then it can't be run.
+    """
+    torques = solved.torques
+    if not np.all(torques.driven):
+        return None
+    blocks, judge = _blocks(torques)
+    held_out = len(blocks) > 1
+    fit = solved.best
+    contest = solved.contest
+    if held_out:
+        coarse = judge[torques.kept]
+        contest = Contest(torques, taking_part=~coarse)
+        fit = contest.again(solved.best)
+    runs = _runs(torques, blocks)
+    before = simulated(as_described(torques.robot), torques, runs)
+    after = simulated(machine_of(contest, fit), torques, runs)
+    return _told(torques, before, after, judge if held_out else np.ones_like(judge), runs, held_out=held_out)
+
+
+def _blocks(torques: Torques) -> tuple[list[tuple[int, int]], Mask]:
+    """First and last sample of each block, and the samples of every other one."""
+    rate, found = torques.log.sample_rate_hz, []
+    least = max(int(_PERIODS / torques.cutoff_hz * rate), 2)
+    for a, b in torques.stretches:
+        edges = np.linspace(a, b, max((b - a) // least, 1) + 1).astype(np.intp)
+        found += list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
+    judge = np.zeros(torques.log.position.shape[1], dtype=bool)
+    for a, b in found[1::2]:
+        judge[a:b] = True
+    return found, judge
+
+
+def _runs(torques: Torques, blocks: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    if torques.log.command_kind == "position" and not torques.by_effort:
+        return blocks
+    count = max(round(torques.log.sample_rate_hz / torques.cutoff_hz), 2)
+    return [(start, min(start + count, b)) for a, b in blocks for start in range(a, b, count)]
+
+
+def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -> Real:
+    """Give ``[joint, sample]``: what the log would read of a machine, run between samples from the log's poses.
+
+    NaN where no run is, and between samples that are nearer to one another than the step; infinite where a run went
+    astray.
+    """
+    from chladni.robots.mujoco_forward import Driven, longest_step_s, run
+
+    log, names = torques.log, torques.log.joints
+    interval_s, longest_s = 1.0 / log.sample_rate_hz, longest_step_s(machine, names)
+    # A step divides a sample, or takes several.
+    every, skip = (
+        max(int(np.ceil(interval_s / longest_s - _ROUNDING)), 1),
+        max(int(longest_s / interval_s + _ROUNDING), 1),
+    )
+    step_s = interval_s * skip / every
+    samples = [np.arange(a, b, skip) for a, b in runs]
+    at_s = [
+        log.time_s[a] + step_s * (np.arange(one.size * every) + 0.5)
+        for (a, _), one in zip(runs, samples, strict=True)
+    ]
+    starts = [a for a, _ in runs]
+    driven = Driven(
+        asked=_asked(machine, torques, np.concatenate(at_s)), kind=_kinds(torques), every=every, step_s=step_s,
+        position=torques.fast_position[:, starts], velocity=torques.fast_velocity[:, starts],
+        steps=np.array([one.size for one in at_s]),
+    )  # fmt: skip
+    found = np.full_like(log.position, np.nan)
+    found[:, np.concatenate(samples)] = run(machine, names, driven)
+    return found
+
+
+def _kinds(torques: Torques) -> tuple[str, ...]:
+    kind = "effort" if torques.by_effort else torques.log.command_kind or "effort"
+    return (kind,) * len(torques.log.joints)
+
+
+def _asked(machine: Machine, torques: Torques, at_s: Real) -> Real:
+    """``[joint, step]``: commands as they arrive, held; or measured efforts."""
+    log = torques.log
+    if torques.by_effort:
+        assert log.effort is not None  # noqa: S101
+        return np.array([np.interp(at_s, log.time_s, row) for row in log.effort])
+    assert log.command_messages is not None  # noqa: S101
+    late = {one.joint.name: one.delay_s for one in machine.joints}
+    found = np.zeros((len(log.joints), at_s.size))
+    for row, (name, (starts, values)) in enumerate(zip(log.joints, log.command_messages, strict=True)):
+        place = np.searchsorted(starts, at_s - late[name], side="right") - 1
+        found[row] = values[np.maximum(place, 0)]
+    return found
+
+
+def _told(
+    torques: Torques, before: Real, after: Real, judge: Mask, runs: list[tuple[int, int]], *, held_out: bool
+) -> Confirmed:
+    measured = torques.log.position
+    there = judge & ~np.isnan(before).any(axis=0) & ~np.isnan(after).any(axis=0)
+    about = measured[:, there] - np.mean(measured[:, there], axis=1, keepdims=True)
+    motion = np.sqrt(np.mean(about**2, axis=1))
+    moves = motion > torques.resolution
+    size = np.where(moves, motion, np.nan)
+    per_joint = [
+        np.sqrt(np.mean((one[:, there] - measured[:, there]) ** 2, axis=1)) / size for one in (before, after)
+    ]
+    whole = [float(np.sqrt(np.mean(one[moves] ** 2))) if moves.any() else float("nan") for one in per_joint]
+    return Confirmed(
+        before=whole[0], after=whole[1], joints=torques.log.joints,
+        per_joint_before=per_joint[0], per_joint_after=per_joint[1], motion=motion,
+        time_s=torques.log.time_s, measured=measured, simulated_before=before, simulated_after=after,
+        judged=there, horizon_s=max(b - a for a, b in runs) / torques.log.sample_rate_hz, held_out=held_out,
+    )  # fmt: skip

@@ -1,0 +1,48 @@
+"""Sentences on what limits an answer about a robot."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from chladni.gap.robots.solved import Solved
+from chladni.io.log_info import some_of
+
+#: Share of a log in which a joint has to move.
+_MOVES = 0.05
+
+
+def remarks_on(solved: Solved, unexplained: Sequence[str]) -> tuple[str, ...]:
+    """Say what was left out while reading, what hardly moves, and where the answer leaves something."""
+    torques = solved.torques
+    return (
+        *torques.robot.remarks,
+        *torques.log.remarks,
+        *_of_joints(solved),
+        *(
+            [f"at {some_of(unexplained)} no word explains what is missing beside the named causes"]
+            if unexplained
+            else []
+        ),
+    )
+
+
+def _of_joints(solved: Solved) -> list[str]:
+    torques = solved.torques
+    found = []
+    if torques.log.unmatched:
+        found.append(
+            f"{some_of(torques.log.unmatched)}: not in the log, taken to rest where the description has them"
+        )
+    if not np.all(torques.driven):
+        names = [one.name for one, there in zip(torques.joints, torques.driven, strict=True) if not there]
+        found.append(
+            f"{some_of(names)}: no torque is known there (no command and gains, no effort); nothing is told of it"
+        )
+    still = [
+        one.name
+        for one, there, driven in zip(torques.joints, np.mean(torques.moving, axis=1), torques.driven, strict=True)
+        if driven and there < _MOVES
+    ]
+    if still:
+        found.append(f"{some_of(still)}: hardly moves; move it over more to tell its friction, inertia and drive")
+    return found

@@ -1,0 +1,82 @@
+"""The search for what a robot's description lacks: terms are added, exchanged and dropped while that pays."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.words import Term
+
+#: Terms that are fitted in full of those that promise most.
+_FITTED = 12
+#: The same in place of another.
+_EXCHANGED = 3
+#: Nats that a move has to bring.
+_WORTH = 1.0
+_MOST = 60
+
+
+def searched(
+    contest: Contest, begin: Fit | None = None, *, progress: Callable[[float], None] = lambda _: None
+) -> Fit:
+    """Give the most probable set that moves lead to, from nothing or from another set."""
+    best = contest.nothing if begin is None else _tidied(contest, begin)
+    for move in range(_MOST):
+        better = _tidied(contest, _best([best, *_more(contest, best)]))
+        if better.nats < best.nats + _WORTH:
+            break
+        best = better
+        progress(min(0.05 * move, 1.0))
+    return best
+
+
+def _more(contest: Contest, best: Fit) -> list[Fit]:
+    """Fit the set with one more of the terms that promise most; or with a word at every joint."""
+    taken = {term.key for term in best.terms}
+    others = [term for _, term in contest.promise(best) if term.key not in taken]
+    found = [contest.fit([*best.terms, term], best) for term in others[:_FITTED]]
+    found += [contest.fit([*best.terms, *shared], best) for shared in _shared(others)]
+    if _best(found).nats > best.nats + _WORTH:
+        return found
+    # Where a description has too much of one thing and too little of another, either alone makes it worse.
+    return found + [two for one in found[:_FITTED] for two in _beside(contest, one)]
+
+
+def _beside(contest: Contest, one: Fit) -> list[Fit]:
+    """Fit a second term at the place of the last one."""
+    last = one.terms[-1]
+    near = [
+        term
+        for _, term in contest.promise(one)
+        if term.key not in {other.key for other in one.terms} and set(term.rows) & set(last.rows)
+    ]
+    return [contest.fit([*one.terms, term], one) for term in near[:_EXCHANGED]]
+
+
+def _shared(others: Sequence[Term]) -> Iterable[list[Term]]:
+    """Words at all joints that lack them."""
+    kinds = dict.fromkeys((term.word, term.variant) for term in others if len(term.rows) == 1)
+    for word, variant in kinds:
+        yield [term for term in others if (term.word, term.variant) == (word, variant) and len(term.rows) == 1]
+
+
+def _tidied(contest: Contest, best: Fit) -> Fit:
+    """Drop terms, and exchange each for another where it acts, while that helps."""
+    while True:
+        found = [one for place in range(len(best.terms)) for one in alternatives(contest, best, place, _EXCHANGED)]
+        better = _best([best, *found])
+        if better is best:
+            return best
+        best = better
+
+
+def alternatives(contest: Contest, best: Fit, place: int, count: int) -> list[Fit]:
+    """Fit what could stand in place of a term: nothing, or another term that promises as much."""
+    rest = [*best.terms[:place], *best.terms[place + 1 :]]
+    taken = {one.key for one in rest}
+    without = contest.fit(rest, best)
+    others = [term for _, term in contest.promise(without) if term.key not in taken and term is not best.terms[place]]
+    found = [contest.fit([*rest, term], best) for term in others[:count]]
+    return [without, *found]
+
+
+def _best(fits: Sequence[Fit]) -> Fit:
+    return max(fits, key=lambda one: one.nats)

@@ -1,0 +1,107 @@
+"""Inverse dynamics of a robot: the torque that a motion needs, and what each link's inertia adds to it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from chladni.robots.robot import Robot
+from chladni.signals.arrays import Real
+from chladni.signals.value import Value
+
+#: Inertial numbers of a link: mass, first moment (x, y, z), inertia about the link's origin (xx, yy, zz, xy, xz, yz).
+INERTIAL = 10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Needed(Value):
+    """What a motion needs.
+
+    Attributes
+    ----------
+    torque
+        ``[dof, sample]`` at every degree of freedom, with gravity, armature, springs and damping as described, N m
+        (N); without friction and drives.
+    regressor
+        ``[dof, sample, link, 10]``: the torque is linear in a link's `INERTIAL` numbers (Atkeson, An & Hollerbach
+        1986); per kg, kg m, kg m^2.
+    inertia
+        ``[dof]``: mean of the diagonal of the joint-space inertia, kg m^2 (kg).
+    """
+
+    torque: Real
+    regressor: Real
+    inertia: Real
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+
+def needed_torque(robot: Robot, position: Real, velocity: Real, acceleration: Real) -> Needed:
+    """Give the torque that a motion needs.
+
+    Parameters
+    ----------
+    position, velocity, acceleration
+        ``[dof, sample]``, SI; of every degree of freedom of the robot in its order.
+    """
+    from chladni.robots.mujoco_motion import inertia_diagonal, walk
+
+    torque, links = walk(robot.model, position, velocity, acceleration)
+    return Needed(torque=torque, regressor=_regressor(links), inertia=inertia_diagonal(robot.model, position))
+
+
+def gravity_columns(robot: Robot, position: Real) -> Real:
+    """Give ``[2, dof, sample]``: torque a radian that the base is turned by, about its x and y axes."""
+    from chladni.robots.mujoco_motion import static_torque, tilted
+
+    step = 1e-3
+    level = static_torque(robot.model, position)
+    return np.stack([(static_torque(tilted(robot.model, axis, step), position) - level) / step for axis in (0, 1)])
+
+
+def inertial_numbers(robot: Robot) -> Real:
+    """Give ``[link, 10]``: the `INERTIAL` numbers of the links as described."""
+    from chladni.robots.mujoco_motion import inertials
+
+    found = []
+    for mass, centre, about_centre in inertials(robot.model):
+        about = about_centre + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        moments = about[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        found.append(np.concatenate([[mass], mass * centre, moments]))
+    return np.array(found)
+
+
+def _regressor(links: "tuple[Real, ...]") -> Real:
+    """Columns by Newton and Euler about each link's own origin, in its own frame."""
+    translate, rotate, turned, linear, angular, spin = links
+    # [sample, link, axis] in the link's frame.
+    inside = np.swapaxes(turned, -1, -2)
+    accel, alpha, omega = (np.einsum("klij,klj->kli", inside, one) for one in (linear, angular, spin))
+    turning = _cross(alpha) + _cross(omega) @ _cross(omega)
+    force = np.zeros((*accel.shape, INERTIAL))
+    moment = np.zeros_like(force)
+    force[..., 0] = accel
+    force[..., 1:4] = turning
+    # h x a = -a x h
+    moment[..., 1:4] = -_cross(accel)
+    moment[..., 4:] = _on_inertia(alpha) + _cross(omega) @ _on_inertia(omega)
+    world_force, world_moment = turned @ force, turned @ moment
+    columns = np.einsum("klav,klap->vklp", translate, world_force)
+    columns += np.einsum("klav,klap->vklp", rotate, world_moment)
+    return np.ascontiguousarray(columns)
+
+
+def _cross(vector: Real) -> Real:
+    """Matrices of the cross product with a vector."""
+    x, y, z = np.moveaxis(vector, -1, 0)
+    none = np.zeros_like(x)
+    rows = [[none, -z, y], [z, none, -x], [-y, x, none]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _on_inertia(vector: Real) -> Real:
+    """Matrices ``[axis, 6]`` that give I v from the six numbers of I."""
+    x, y, z = np.moveaxis(vector, -1, 0)
+    none = np.zeros_like(x)
+    rows = [[x, none, none, y, z, none], [none, y, none, x, none, z], [none, none, z, none, x, y]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

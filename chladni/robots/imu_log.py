@@ -1,0 +1,129 @@
+"""The IMU of a robot's base, on the grid of its joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from chladni.io.message_path import near_matches, topic_text
+from chladni.signals.errors import LogError
+from chladni.signals.resampling import join_resampled
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.visible import visible
+
+if TYPE_CHECKING:
+    from chladni.io.log import Log
+    from chladni.robots.robot import Robot
+    from chladni.signals.arrays import Index, Real
+
+_GYRO: Final = "angular_velocity"
+_ACCELEROMETER: Final = "linear_acceleration"
+_ATTITUDE: Final = "orientation"
+# What resampling needs beyond the states, at the lowest rates of IMUs.
+_BEYOND_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ImuLog:
+    """What an IMU measured, at the samples of the joints; NaN where it has none.
+
+    Attributes
+    ----------
+    topic, site
+        Where it was read, and the site or link of the description where it sits.
+    angular_velocity, linear_acceleration
+        ``[axis, sample]`` rad/s and m/s^2, in the frame of the IMU; a level IMU at rest shows +9.81 along z.
+    orientation
+        ``[w x y z, sample]``, of the IMU in the world; None where nobody fills it.
+    """
+
+    topic: str
+    site: str
+    angular_velocity: Real
+    linear_acceleration: Real
+    orientation: Real | None
+
+
+def read_imu(robot: Robot, log: Log, states: TimeSeries, kept: Index) -> tuple[ImuLog | None, tuple[str, ...]]:
+    """Read the IMU that the robot file names; of a base that floats the only one of the log, without a robot file.
+
+    Parameters
+    ----------
+    robot, log
+        As for `chladni.robots.joint_log.joint_log`.
+    states
+        Whose grid it's brought to.
+    kept
+        Samples of it.
+
+    Returns
+    -------
+    imu : ImuLog or None
+        None where none is named, and the base is fixed or the log has none or several.
+    remarks
+        How it was chosen and read.
+
+    Raises
+    ------
+    LogError
+        When the log doesn't have the one that is named, or its samples aren't uniform.
+    """
+    topics = {one.name.removesuffix(f".{_GYRO}.x") for one in log.channels if one.name.endswith(f".{_GYRO}.x")}
+    topic, site, remarks = _chosen(robot, log, topics)
+    if topic is None:
+        return None, remarks
+    known = {one.name for one in log.channels}
+    turning, pushing = ([f"{topic}.{field}.{axis}" for axis in "xyz"] for field in (_GYRO, _ACCELEROMETER))
+    attitude = [path for axis in "wxyz" if (path := f"{topic}.{_ATTITUDE}.{axis}") in known]
+    wanted = [*turning, *pushing, *(attitude if len(attitude) == 4 else ())]
+    begin_s = (states.start_time_ns - log.start_time_ns) / NS_PER_S
+    read = join_resampled(
+        log.read_groups(wanted, start_s=begin_s - _BEYOND_S, end_s=begin_s + states.duration_s + _BEYOND_S),
+        sample_rate_hz=states.sample_rate_hz,
+        start_time_ns=states.start_time_ns,
+        samples=states.samples,
+        method="band-limited",
+    ).series.select(wanted)
+    values = read.values[:, kept].astype(np.float64)
+    return (
+        ImuLog(
+            topic=topic,
+            site=site,
+            angular_velocity=values[:3],
+            linear_acceleration=values[3:6],
+            orientation=_filled_attitude(values[6:]),
+        ),
+        remarks,
+    )
+
+
+def _chosen(robot: Robot, log: Log, topics: set[str]) -> tuple[str | None, str, tuple[str, ...]]:
+    named = robot.log.imu
+    if named is not None:
+        topic = topic_text(named.topic)
+        if topic not in topics:
+            raise LogError(
+                f"{log.path.name}: no topic {named.topic!r} with an {_GYRO}; {near_matches(named.topic, topics)}"
+            )
+        return topic, named.site, ()
+    if robot.base == "fixed" or not topics:
+        return None, "", ()
+    if len(topics) > 1:
+        told = ", ".join(map(visible, sorted(topics)))
+        return None, "", (f"{told}: name the IMU of the base as imu in [log] of a robot file",)
+    topic = next(iter(topics))
+    site = next((one for one in robot.sites if "imu" in one.lower()), robot.links[0])
+    return topic, site, (f"{visible(topic)} is taken as the IMU of the base, at {visible(site)}",)
+
+
+def _filled_attitude(values: Real) -> Real | None:
+    """Quaternions of length one; None where they aren't, or stay the same, as where nobody fills them."""
+    if not values.size:
+        return None
+    length = np.linalg.norm(values, axis=0)
+    there = np.isfinite(length)
+    if not there.any() or not np.ptp(values[:, there], axis=1).any() or np.median(length[there]) < 1 / 2:
+        return None
+    return np.asarray(values / length)

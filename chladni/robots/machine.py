@@ -1,0 +1,182 @@
+"""The machine that a robot's description stands for: its numbers as they are believed, or as a log tells them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from chladni.robots.dynamics import inertial_numbers
+
+if TYPE_CHECKING:
+    from chladni.robots.robot import Robot, RobotJoint, Servo
+    from chladni.signals.arrays import Real
+
+_ROUNDING: Final = 1e-9
+#: Of its lowest described eigenvalue: what is left of it.
+_LEAST: Final = 0.01
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MachineJoint:
+    """A joint of the machine, in SI units.
+
+    Attributes
+    ----------
+    joint
+        As described.
+    servo
+        Its drive: gains and limit as the machine has them, but for `gain`; None for a passive joint.
+    friction, load, rise, fading
+        Dry friction ``friction + load |torque| + rise exp(-(speed / fading)^2)``: N m (N), 1, N m (N), rad/s (m/s).
+    damping, quadratic
+        Friction in proportion to the speed, and to its square.
+    armature
+        Rotor inertia at the joint.
+    stiffness, torque
+        Of what pulls back beyond the description's own springs: ``stiffness q + torque``.
+    gain
+        Torque that arrives over torque that the drive was asked for.
+    lag_s
+        Time constant of the torque.
+    delay_s
+        By which commands arrive late.
+    reading, drive_reading
+        What the log reads, and what the drive reads beyond the log, minus the truth; rad (m).
+    """
+
+    joint: RobotJoint
+    servo: Servo | None
+    friction: float
+    damping: float
+    armature: float
+    load: float = 0.0
+    rise: float = 0.0
+    fading: float = 1.0
+    quadratic: float = 0.0
+    stiffness: float = 0.0
+    torque: float = 0.0
+    gain: float = 1.0
+    lag_s: float = 0.0
+    delay_s: float = 0.0
+    reading: float = 0.0
+    drive_reading: float = 0.0
+
+    def gains(self) -> tuple[float, float, float]:
+        """Give kp, kd and limit as they act at the joint; zeros and an infinite limit where nothing says."""
+        servo = self.servo
+        if servo is None:
+            return 0.0, 0.0, np.inf
+        limit = np.inf if servo.limit is None else servo.limit
+        return self.gain * (servo.kp or 0.0), self.gain * (servo.kd or 0.0), self.gain * limit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coupling:
+    """Friction of ``speed of the first joint + sense times that of the second``, whose gears run in one another.
+
+    Attributes
+    ----------
+    joints, sense
+        Names; 1 or -1.
+    friction, damping
+        N m; N m s/rad.
+    """
+
+    joints: tuple[str, str]
+    sense: float
+    friction: float = 0.0
+    damping: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Machine:
+    """A robot with the numbers of its machine.
+
+    Attributes
+    ----------
+    robot
+        As described.
+    joints
+        All of them, in the robot's order.
+    inertial
+        ``[link, 10]`` as `chladni.robots.dynamics.INERTIAL` lists them.
+    tilt
+        Angles by which the base is turned about its x and y axes, rad.
+    couplings
+        Between neighbours.
+    """
+
+    robot: Robot
+    joints: tuple[MachineJoint, ...]
+    inertial: Real
+    tilt: tuple[float, float] = (0.0, 0.0)
+    couplings: tuple[Coupling, ...] = ()
+
+
+def as_described(robot: Robot) -> Machine:
+    """Give the machine that the description believes in."""
+    joints = tuple(
+        MachineJoint(
+            joint=one, servo=one.servo, friction=one.friction, damping=one.damping, armature=one.armature,
+            delay_s=robot.delay_s,
+        )
+        for one in robot.joints
+    )  # fmt: skip
+    return Machine(robot=robot, joints=joints, inertial=inertial_numbers(robot))
+
+
+def physical(described: Real, wanted: Real) -> Real:
+    """Go from the described inertial numbers of a link as far to the wanted ones as a body can have.
+
+    A body can have numbers whose pseudo-inertia ``[[S, h], [h', m]]``, S the second moments of its mass, is positive
+    semi-definite (Wensing, Kim & Slotine 2018); what is described counts as such, but for rounding.
+
+    Parameters
+    ----------
+    described, wanted
+        ``[10]``.
+    """
+    # Near the bounds a body is a point, a rod or a plate, which no tolerance makes of another.
+    lowest = _lowest(described)
+    allowed = _LEAST * lowest if lowest > 0 else lowest - _ROUNDING
+
+    def fits(share: float) -> bool:
+        return _lowest(described + share * (wanted - described)) >= allowed
+
+    low, high = 0.0, 1.0
+    if fits(high):
+        return wanted
+    # Bodies' numbers form a convex set.
+    for _ in range(30):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return np.asarray(described + low * (wanted - described))
+
+
+def about_centre(numbers: Real) -> tuple[float, Real, Real]:
+    """Give mass, centre of mass and inertia about it ``[3, 3]`` of the ten numbers of a link with a mass."""
+    mass, moment = float(numbers[0]), numbers[1:4]
+    centre = moment / mass
+    inertia = _inertia(numbers) - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    low, middle, high = np.linalg.eigvalsh(inertia)
+    # MuJoCo takes the sum of two principal moments for less than the third if it is so by rounding alone.
+    short = high * (1.0 + _ROUNDING) - low - middle
+    return mass, centre, inertia + np.eye(3) * (short if 0.0 < short < 1e3 * _ROUNDING * high else 0.0)
+
+
+def _inertia(numbers: Real) -> Real:
+    xx, yy, zz, xy, xz, yz = numbers[4:]
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _lowest(numbers: Real) -> float:
+    """Lowest eigenvalue of the pseudo-inertia, in lengths such that it's of order one."""
+    inertia, mass = _inertia(numbers), numbers[0]
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    length = np.sqrt(max(float(np.trace(second)), 1e-30) / max(float(mass), 1e-30))
+    whole = np.empty((4, 4))
+    whole[:3, :3], whole[:3, 3], whole[3, :3] = second / length**2, numbers[1:4] / length, numbers[1:4] / length
+    whole[3, 3] = mass
+    return float(np.linalg.eigvalsh(whole)[0] / max(abs(mass), 1e-30))

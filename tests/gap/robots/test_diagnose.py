@@ -1,0 +1,141 @@
+"""What is named of robots whose machines are known: MuJoCo runs them by its own drives."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import chladni
+from chladni.gap.records.diagnosis import Diagnosis
+from chladni.gap.robots.diagnose import ROBOT_WORDS, diagnose_robot
+from chladni.gap.robots.torques import torques_of
+from chladni.gap.robots.words import all_terms
+from chladni.robots.robot import Robot
+from chladni.signals.errors import LogError, ModelError, SetupError
+from tests.robots.machines import RATE_HZ, arm, commands, joint_log_of, run_native
+
+pytest.importorskip("mujoco")
+
+SECONDS = 12.0
+
+
+def found_of(folder: Path, *, leave_out: frozenset[str] = frozenset(), **machine: str) -> Diagnosis:
+    """The answer on a log of a machine that differs from the arm as described."""
+    command = commands(SECONDS)
+    position = run_native(arm(folder, "machine/arm.xml", **machine), command)
+    robot = arm(folder)
+    return diagnose_robot(robot, joint_log_of(robot, position, command=command), leave_out=leave_out)
+
+
+def named(found: Diagnosis) -> set[tuple[str, str]]:
+    """Words and sites."""
+    return {(one.effect, one.site) for one in found.causes}
+
+
+def test_a_robot_that_is_right_lacks_nothing(tmp_path: Path) -> None:
+    found = found_of(tmp_path)
+    assert found.verdict == "none"
+    assert not found.causes
+
+
+def test_friction_and_a_delay_are_named_with_their_sizes(tmp_path: Path) -> None:
+    found = found_of(tmp_path, shoulder=' frictionloss="2"', servo=' delay="0.012" nsample="40"')
+    assert named(found) == {("coulomb_friction", "shoulder"), ("delay", "all commands")}
+    sizes = {one.effect: next(iter(one.parameters.values())) for one in found.causes}
+    assert sizes["coulomb_friction"].value == pytest.approx(2.0, rel=0.1)
+    assert sizes["delay"].value == pytest.approx(0.012, abs=1e-3)
+    assert all(one.probability > 0.6 for one in found.causes)
+    assert found.gap.by == "windows"
+    assert found.gap.after < 0.2 * found.gap.before
+    assert found.where.sites[0].name == "shoulder"
+
+
+def test_gains_are_told_from_torques(tmp_path: Path) -> None:
+    found = found_of(tmp_path, kp="96")
+    assert ("controller_gain", "shoulder") in named(found)
+    assert found.causes[0].parameters["kp"].value == pytest.approx(0.8, abs=0.04)
+
+
+def test_a_heavy_forearm_is_one_of_its_own_words(tmp_path: Path) -> None:
+    found = found_of(tmp_path, mass="1.6")
+    names = named(found)
+    assert len(names) == 1
+    assert names <= {("payload", "fore"), ("parameter", "fore.mass")}
+
+
+def test_less_friction_than_described_is_a_wrong_value(tmp_path: Path) -> None:
+    command = commands(SECONDS)
+    machine = arm(tmp_path, "machine/arm.xml", shoulder=' frictionloss="0.5"')
+    robot = arm(tmp_path, "described/arm.xml", shoulder=' frictionloss="2.5"')
+    log = joint_log_of(robot, run_native(machine, command), command=command)
+    found = diagnose_robot(robot, log)
+    assert named(found) == {("parameter", "shoulder.frictionloss")}
+    assert found.verdict == "parameters"
+    assert found.causes[0].parameters["value"].value == pytest.approx(0.5, abs=0.3)
+
+
+def test_a_word_that_is_left_out_is_not_replaced_by_a_sure_wrong_one(tmp_path: Path) -> None:
+    frictions = {word for word in ROBOT_WORDS if "friction" in word}
+    found = found_of(tmp_path, shoulder=' frictionloss="2"', leave_out=frozenset(frictions | {"quadratic_damping"}))
+    assert all(one.probability < 0.9 for one in found.causes)
+    if found.verdict == "unknown":
+        assert "shoulder" in (found.advice or "")
+
+
+def test_efforts_that_were_measured_need_no_gains(tmp_path: Path) -> None:
+    command = commands(SECONDS)
+    position = run_native(arm(tmp_path, "machine/arm.xml", shoulder=' frictionloss="2"'), command)
+    velocity = np.gradient(position, 1.0 / RATE_HZ, axis=1)
+    # What the drives gave about a sample: half of the time for the command before it.
+    asked = 0.5 * (command + np.concatenate([command[:, :1], command[:, :-1]], axis=1))
+    effort = np.array([[120.0], [60.0]]) * (asked - position) - np.array([[8.0], [3.0]]) * velocity
+    robot = without_servos(arm(tmp_path))
+    found = diagnose_robot(robot, joint_log_of(robot, position, effort=effort))
+    assert named(found) == {("coulomb_friction", "shoulder")}
+
+
+def without_servos(robot: Robot) -> Robot:
+    """As a URDF has it."""
+    return replace(robot, joints=tuple(replace(one, servo=None) for one in robot.joints))
+
+
+def test_what_can_not_be_told_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    command = commands(3.0)
+    robot = arm(tmp_path)
+    position = run_native(robot, command)
+    with pytest.raises(ModelError, match=r"no gains of its drives.*\[control\]"):
+        diagnose_robot(without_servos(robot), joint_log_of(robot, position, command=command))
+    with pytest.raises(LogError, match="neither commands nor measured efforts"):
+        diagnose_robot(robot, joint_log_of(robot, position))
+    with pytest.raises(LogError, match="record a longer one"):
+        diagnose_robot(robot, joint_log_of(robot, position[:, :100], command=command[:, :100]))
+    with pytest.raises(ModelError, match="its base floats"):
+        diagnose_robot(replace(robot, base="floating"), joint_log_of(robot, position, command=command))
+
+
+def test_words_that_can_be_left_out_are_those_that_take_part(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(6.0)
+    torques = torques_of(robot, joint_log_of(robot, run_native(robot, command), command=command))
+    words = {term.word for term in all_terms(torques)} - {"parameter"}
+    assert words == set(ROBOT_WORDS)
+
+
+def test_the_facade_takes_a_robot_and_its_bag(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(SECONDS)
+    machine = arm(tmp_path, "machine/arm.xml", shoulder=' frictionloss="2"')
+    bag = tmp_path / "arm.mcap"
+    channels = [chladni.Channel(name=f"/joint_states.position[{one.name}]") for one in robot.joints]
+    asked = [chladni.Channel(name=f"/joint_commands.position[{one.name}]") for one in robot.joints]
+    series = [
+        chladni.TimeSeries(values=values, sample_rate_hz=RATE_HZ, channels=tuple(names))
+        for values, names in ((run_native(machine, command), channels), (command, asked))
+    ]
+    chladni.write_mcap(series, bag)
+    found = chladni.diagnose_gap(robot.description, bag)
+    assert named(found) == {("coulomb_friction", "shoulder")}
+    assert found.used[0].log == "arm.mcap"
+    with pytest.raises(SetupError, match="one log at a time"):
+        chladni.diagnose_gap(robot.description, [bag, bag])
+    with pytest.raises(SetupError, match="no effect 'coulomb' of a robot"):
+        chladni.diagnose_gap(robot.description, bag, leave_out=["coulomb"])
