@@ -15,7 +15,7 @@ Matrix = NDArray[np.float64]
 #: effect near or under the noise. ``leave_out``: one whose word the catalogue must not hold. ``outside``: one that no
 #: word fits. ``topology``: a link that the model lacks. ``value``: one number or several wrong by up to a factor of
 #: ten. ``value_and_effect``: wrong numbers and effects together. Of robots: ``all_joints``: friction in every joint.
-#: ``ordinary``: friction, a common delay and a heavier link. ``gains``: one effect, and a servo whose gains are unknown.
+#: ``ordinary``: friction, a common delay and a heavier link. ``gains``: one effect, and a servo of unknown gains.
 Kind = Literal[
     "effect", "none", "parameters", "two", "three", "faint", "leave_out", "outside", "topology", "value",
     "value_and_effect", "all_joints", "ordinary", "gains",

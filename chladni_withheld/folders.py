@@ -23,7 +23,7 @@ from chladni.io.validation import ModelT, validated
 from chladni.signals.errors import SetupError
 from chladni.signals.wording import MOST_SHOWN, counted, shown
 from chladni_withheld.case import Kind
-from chladni_withheld.vocabulary import WORDS
+from chladni_withheld.vocabulary import FAMILY_OF
 
 RESULT_FORMAT, FAILURE_FORMAT = "chladni.gap/1", "chladni.blind-failure/1"
 _MOST_TOLD = 3
@@ -34,7 +34,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 def _word(text: str) -> str:
-    if text not in WORDS:
+    if text not in FAMILY_OF:
         raise ValueError("must be an effect of the vocabulary")
     return text
 

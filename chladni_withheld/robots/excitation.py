@@ -44,7 +44,7 @@ def _fourier(rng: Rng, room: Room, length_s: float) -> Reference:
     return _sines(rng, room, np.arange(1, int(rng.integers(4, 8))) / period_s)
 
 
-def _multisine(rng: Rng, room: Room, length_s: float) -> Reference:
+def _multisine(rng: Rng, room: Room, _length_s: float) -> Reference:
     return _sines(rng, room, np.sort(rng.uniform(0.1, rng.uniform(0.8, 1.8), 8)))
 
 

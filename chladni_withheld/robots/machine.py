@@ -51,15 +51,15 @@ class Transmission:
         Whole width of the play, rad.
     inertia
         Of the motor, seen at the joint, kg m^2.
-    reads_motor
-        Whether the encoder sits at the motor.
+    logs_motor
+        Whether the encoder whose reading is logged sits at the motor, as that of the loop does.
     """
 
     stiffness: Matrix
     damping: Matrix
     gap: Matrix
     inertia: Matrix
-    reads_motor: bool = False
+    logs_motor: bool = False
 
     @classmethod
     def rigid(cls, count: int) -> "Transmission":
@@ -80,8 +80,10 @@ class Servo:
         From a command's stamp to its being used, of each joint.
     lag_s
         First-order time constant that the reference passes, zero for none.
-    limit
-        Largest torque, N m.
+    limit, dead
+        Largest torque, and the torque that a drive must be asked for before it gives any, N m.
+    most
+        Torque at which the motor saturates, which its loop doesn't know.
     gain
         Torque that arrives over torque that was asked for.
     """
@@ -89,9 +91,11 @@ class Servo:
     kp: Matrix
     kd: Matrix
     limit: Matrix
+    dead: Matrix
     period_s: float
     delay_s: Matrix
     lag_s: Matrix
+    most: Matrix
     gain: Matrix
 
 
@@ -189,7 +193,7 @@ _SAMPLED = ("reading", "speed", "acceleration", "asked", "given", "link", "link_
 
 
 class _Run:
-    """The state of a machine on its way: links `q`, `v`; motors `theta`, `omega`, which rigid joints share with them."""
+    """A machine on its way: links `q`, `v`; motors `theta`, `omega`, which rigid joints share with them."""
 
     def __init__(self, machine: Machine, commands: Commands, step_s: float, resolution: float) -> None:
         self.machine, self.commands, self.h, self.resolution = machine, commands, step_s, resolution
@@ -218,9 +222,7 @@ class _Run:
     def control(self, t: float) -> None:
         """Read encoders and commands, and ask for a torque."""
         servo, machine = self.machine.servo, self.machine
-        at_motor = machine.transmission.reads_motor
-        reading = (self.theta if at_motor else self.q) + machine.offset
-        speed = self.omega if at_motor else self.v
+        reading, speed = self.theta + machine.offset, self.omega
         if self.resolution:
             reading = np.rint(reading / self.resolution) * self.resolution
         # A message whose stamp is just reached counts.
@@ -228,7 +230,9 @@ class _Run:
         held = self.commands.values[np.arange(sent.size), np.maximum(sent - 1, 0)]
         self.reference = self.reference + (held - self.reference) * servo.period_s / (servo.lag_s + servo.period_s)
         self.asked = np.clip(servo.kp * (self.reference - reading) - servo.kd * speed, -servo.limit, servo.limit)
-        self.given = servo.gain * self.asked
+        given = self.asked - np.clip(self.asked, -servo.dead, servo.dead)
+        # What saturates isn't told by the loop's own limit.
+        self.given = servo.gain * np.clip(given, -servo.most, servo.most)
 
     def advance(self, t: float) -> None:
         """Go one step."""
@@ -278,7 +282,7 @@ class _Run:
 
     def sample(self) -> tuple[Matrix, ...]:
         """What is logged, in the order of `_SAMPLED`."""
-        if self.machine.transmission.reads_motor:
+        if self.machine.transmission.logs_motor:
             reading, speed, acceleration = self.theta, self.omega, self.turning
         else:
             reading, speed, acceleration = self.q, self.v, self.alpha

@@ -95,7 +95,8 @@ def draw_scene(rng: Rng, *, inertia: float = INERTIA_SIGMA, declared: float | No
     recorder = _draw_recorder(rng)
     room = draw_room(rng, robot)
     word, reference = draw_reference(rng, room, recorder.length_s)
-    sent_s = recorder.command_s + np.arange(-int(LEAD_S * recorder.command_hz), int(recorder.length_s * recorder.command_hz)) / recorder.command_hz  # fmt: skip
+    before, after = int(LEAD_S * recorder.command_hz), int(recorder.length_s * recorder.command_hz)
+    sent_s = recorder.command_s + np.arange(-before, after) / recorder.command_hz
     values = reference(sent_s)
     # Some logs begin at rest, somewhere: before that the robot is held where it begins.
     if rng.random() < 0.5:
@@ -108,9 +109,8 @@ def draw_scene(rng: Rng, *, inertia: float = INERTIA_SIGMA, declared: float | No
     machine = Machine(model=model, servo=servo, friction=Friction.none(count), transmission=Transmission.rigid(count),
                       offset=np.zeros(count))  # fmt: skip
     tolerance = {"inertia": inertia if declared is None else declared, "gains": 0.0}
-    scene = Scene(robot=robot, machine=machine, commands=commands, recorder=recorder, excitation=word,
+    return Scene(robot=robot, machine=machine, commands=commands, recorder=recorder, excitation=word,
                   gains=(servo.kp, servo.kd), tolerance=tolerance)  # fmt: skip
-    return scene
 
 
 def _draw_robot(rng: Rng) -> Description:
@@ -148,7 +148,8 @@ def true_model(rng: Rng, model: pin.Model, sigma: float) -> pin.Model:
     for index in range(1, model.njoints):
         inertia = model.inertias[index]
         off = 1.0 + sigma * np.clip(rng.normal(size=5), -2.0, 2.0)
-        true.inertias[index] = pin.Inertia(inertia.mass * off[0], inertia.lever * off[1:4], inertia.inertia * off[0] * off[4])  # fmt: skip
+        mass, around = inertia.mass * off[0], inertia.inertia * off[0] * off[4]
+        true.inertias[index] = pin.Inertia(mass, inertia.lever * off[1:4], around)
     return true
 
 
@@ -168,7 +169,8 @@ def _draw_servo(rng: Rng, robot: Description, model: pin.Model, commands: Comman
     if fastest * period_s > 0.6:
         raise RefusedError("servo too fast for its loop")
     count = len(robot.joints)
-    return Servo(kp=kp, kd=kd, limit=rounded(robot.effort), period_s=period_s, delay_s=np.zeros(count),
+    return Servo(kp=kp, kd=kd, limit=rounded(robot.effort), dead=np.zeros(count),
+                 most=np.full(count, np.inf), period_s=period_s, delay_s=np.zeros(count),
                  lag_s=np.zeros(count), gain=np.ones(count))  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pinocchio as pin
+from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfiltfilt
 
 from chladni_withheld.case import Matrix
@@ -13,6 +14,8 @@ BAND_HZ = 8.0
 #: Share of a joint's torque that no one can tell, whose encoders are however good.
 FLOOR = 0.02
 _ENOUGH_HZ = 100.0
+#: Inertias may be as far off as that.
+_MOST_SIGMAS = 3.0
 
 
 def lacking(scene: Scene, model: pin.Model, motion: Motion) -> Matrix:
@@ -57,41 +60,46 @@ def noise_of(scene: Scene, motion: Motion) -> Matrix:
     return found
 
 
-def severity(scene: Scene, difference: Matrix, motion: Motion) -> tuple[float, float]:
+def severity(scene: Scene, difference: Matrix, motion: Motion, *, but: int = -1) -> tuple[float, float]:
     """Torque of a cause over what can't be told, and the same when inertias take what their tolerances allow.
 
     RMS over the log of the whitened torques' length over the joints: a cause at one joint is as large as there.
+
+    Parameters
+    ----------
+    difference
+        What `lacking` gives.
+    but
+        A link whose numbers stay: they are the cause.
     """
     noise = noise_of(scene, motion)
     # What is smooth needs no more.
     stride = max(1, int(scene.recorder.state_hz // _ENOUGH_HZ))
-    motion, rate_hz = motion.every(stride), scene.recorder.state_hz / stride
+    rate_hz = scene.recorder.state_hz / stride
     lacks = (smooth(difference[:, ::stride], rate_hz) / noise[:, None]).ravel()
-    columns = _inertia_columns(scene, motion) / noise[:, None, None]
-    columns = smooth(np.moveaxis(columns, 2, 1), rate_hz)
-    table = np.moveaxis(columns, 1, 2).reshape(lacks.size, -1)
-    samples = motion.t_s.size
-    # Each column is one sigma of one number; as unlikely as the noise over so many independent samples.
-    weight = np.sqrt(rate_hz / (2.0 * BAND_HZ))
-    left = lacks - table @ np.linalg.lstsq(np.vstack([table, weight * np.eye(table.shape[1])]),
-                                           np.concatenate([lacks, np.zeros(table.shape[1])]))[0]  # fmt: skip
-    return float(np.sqrt(np.sum(lacks**2) / samples)), float(np.sqrt(np.sum(left**2) / samples))
+    columns = _inertia_columns(scene, motion.every(stride), but) / noise[:, None, None]
+    table = smooth(columns, rate_hz).transpose(0, 2, 1).reshape(lacks.size, -1)
+    q, r = np.linalg.qr(table)
+    within = lsq_linear(r, q.T @ lacks, bounds=(-_MOST_SIGMAS, _MOST_SIGMAS)).x
+    return tuple(float(np.linalg.norm(each) / np.sqrt(lacks.size / noise.size)) for each in (lacks, lacks - table @ within))
 
 
-def _inertia_columns(scene: Scene, motion: Motion) -> Matrix:
-    """Torque of one sigma of every link's mass, centre and inertia: ``[joint, sample, number]``."""
+def _inertia_columns(scene: Scene, motion: Motion, but: int) -> Matrix:
+    """Torque of one sigma of every link's mass, centre and inertia: ``[joint, number, sample]``."""
     model, sigma = scene.robot.model, scene.tolerance["inertia"]
     data = model.createData()
-    tables = np.array([pin.computeJointTorqueRegressor(model, data, *each) for each in
-                       zip(motion.reading.T, motion.speed.T, motion.acceleration.T, strict=True)])  # fmt: skip
-    numbers = []
-    for index in range(1, model.njoints):
-        inertia = model.inertias[index]
-        here = inertia.toDynamicParameters()
+    tables = np.array([
+        pin.computeJointTorqueRegressor(model, data, *each)
+        for each in zip(motion.reading.T, motion.speed.T, motion.acceleration.T, strict=True)
+    ])  # fmt: skip
+    columns = []
+    for link in set(range(model.nv)) - {but}:
+        inertia = model.inertias[link + 1]
         mass, lever, around = inertia.mass, inertia.lever, inertia.inertia
-        off = [pin.Inertia(mass * (1.0 + sigma), lever, around * (1.0 + sigma))]
-        off += [pin.Inertia(mass, lever * (1.0 + sigma * axis), around) for axis in np.eye(3)]
-        off += [pin.Inertia(mass, lever, around * (1.0 + sigma))]
-        numbers += [(index - 1, each.toDynamicParameters() - here) for each in off]
-    columns = [tables[:, :, 10 * link : 10 * link + 10] @ change for link, change in numbers]
-    return np.moveaxis(np.array(columns), (2, 1, 0), (0, 1, 2))
+        off = [pin.Inertia(mass * (1.0 + sigma), lever, around * (1.0 + sigma)),
+               *(pin.Inertia(mass, lever * (1.0 + sigma * axis), around) for axis in np.eye(3)),
+               pin.Inertia(mass, lever, around * (1.0 + sigma))]  # fmt: skip
+        here = inertia.toDynamicParameters()
+        columns += [tables[:, :, 10 * link : 10 * link + 10] @ (each.toDynamicParameters() - here) for each in off]
+    found: Matrix = np.array(columns).transpose(2, 0, 1)
+    return found
