@@ -80,6 +80,14 @@ class Named(_Document):
     site: Text
 
 
+class Hidden(Named):
+    """What was hidden: its numbers, how clear it is, and what else says the same."""
+
+    parameters: dict[str, Any] | None = None
+    severity_tuned: Number | None = None
+    also: list[Named] | None = None
+
+
 class SealedCase(_Document):
     """``chladni.blind-case/1``."""
 
@@ -91,13 +99,14 @@ class Truth(_Document):
     """``chladni.blind-truth/1``: what was hidden, how far it is off the noise, and what was sealed with it."""
 
     kind: Kind
-    effects: list[Named]
+    effects: list[Hidden]
     coloured: bool = False
     off: dict[str, Any] | None = None
     ratio: Number | None = None
     ratio_tuned: Number | None = None
     ideal: Annotated[float, Field(gt=0.0)] | None = None
     files: dict[str, str] | None = None
+    gains: dict[str, dict[str, float]] | None = None
 
     @model_validator(mode="after")
     def _hides_something(self) -> Self:
@@ -118,6 +127,7 @@ class Cause(Named):
     group: list[Text] | None = None
     probability: Share | None = None
     alternatives: list[OtherEffect] | None = None
+    parameters: dict[str, Any] | None = None
 
 
 class Ranked(Named):
@@ -140,6 +150,8 @@ class Result(_Document):
     ranking: list[Ranked] | None = None
     naive: Named | None = None
     gap: Gap | None = None
+    where: dict[str, Any] | None = None
+    tuned_parameters: dict[str, Any] | None = None
 
 
 CASE_FORMAT, TRUTH_FORMAT = "chladni.blind-case/1", "chladni.blind-truth/1"

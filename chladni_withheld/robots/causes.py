@@ -241,7 +241,9 @@ def armature(rng: Rng, stage: Stage, joint: int) -> Cause:
         model.armature = _at(model.armature, joint, inertia)
         return replace(machine, model=model)
 
-    return Cause(effect="armature", site=stage.name(joint), law="rotor", parameters={"inertia": inertia}, change=change)
+    return Cause(
+        effect="armature", site=stage.name(joint), law="rotor", parameters={"inertia": inertia}, change=change
+    )
 
 
 def elasticity(rng: Rng, stage: Stage, joint: int) -> Cause:

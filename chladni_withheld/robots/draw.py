@@ -57,7 +57,12 @@ def draw_case(seed: int, index: int, kind: Kind) -> WithheldCase:
 
 def _words(kind: Kind, seed: int, index: int) -> list[str]:
     """All words that a kind draws from, in the order of this case: each comes as often as the others."""
-    words = {"outside": tuple(OUTSIDE_CAUSES), "leave_out": _LEFT_OUT}.get(kind, tuple(CAUSES))
+    words: tuple[str, ...] = tuple(OUTSIDE_CAUSES) if kind == "outside" else tuple(CAUSES)
+    if kind == "leave_out":
+        words = _LEFT_OUT
+    if kind == "gains":
+        # A gain that is off where all are would be the same twice.
+        words = tuple(word for word in CAUSES if word not in ("gain_error", "controller_gain"))
     turn = np.random.default_rng((seed, index // len(words))).permutation(len(words))
     return [words[place] for place in np.roll(turn, -(index % len(words)))]
 
@@ -82,7 +87,7 @@ def _drawn(rng: Rng, kind: Kind, words: Sequence[str], refused: Sequence[str]) -
         topics=topics(rng, scene, motion), effects=tuple(told), ratio=None if whole is None else whole[0],
         ratio_tuned=None if whole is None else whole[1], excitation=(scene.excitation,),
         starts_in_motion=bool(np.abs(motion.speed[:, 0]).max() > 0.01), leave_out=_leave_out(rng, kind, told),
-        further={"robot": _robot(scene, machine), "gains": _gains(scene) if kind == "gains" else {},
+        further={"robot": _robot(scene, machine), **({"gains": _gains(scene)} if kind == "gains" else {}),
                  "inertias_exact": exact, "refused": list(refused)},
     )  # fmt: skip
 
