@@ -10,7 +10,10 @@ import numpy as np
 from chladni.signals.errors import EstimateError
 from chladni.signals.linear_algebra import in_one_thread
 from chladni_withheld.case import HiddenEffect, Kind, WithheldCase
-from chladni_withheld.robots.causes import CAUSES, OUTSIDE_CAUSES, Cause, Stage, coulomb, heavy_link
+from chladni_withheld.robots.at_joints import coulomb
+from chladni_withheld.robots.at_links import heavy_link
+from chladni_withheld.robots.cause import Cause, Stage
+from chladni_withheld.robots.causes import CAUSES, OUTSIDE_CAUSES
 from chladni_withheld.robots.excitation import Rng
 from chladni_withheld.robots.machine import Machine, Motion
 from chladni_withheld.robots.recording import URDF, robot_toml, topics

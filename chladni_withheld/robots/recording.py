@@ -34,7 +34,7 @@ def topics(rng: Rng, scene: Scene, motion: Motion) -> tuple[TimeSeries, ...]:
 
 
 def _noisy(rng: Rng, signals: Matrix, share: float) -> Matrix:
-    return signals + share * signals.std(axis=1, keepdims=True) * rng.normal(size=signals.shape)
+    return np.asarray(signals + share * signals.std(axis=1, keepdims=True) * rng.normal(size=signals.shape))
 
 
 def _series(scene: Scene, topic: str, arrays: Mapping[str, Matrix], rate_hz: float, begin_s: float) -> TimeSeries:

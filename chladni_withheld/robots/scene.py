@@ -1,7 +1,7 @@
 """A robot with nothing hidden: description, true inertias, servo, trajectory, and how it is logged."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -125,14 +125,13 @@ def _draw_recorder(rng: Rng) -> Recorder:
     state_hz = float(rng.choice(_STATE_HZ))
     slower = [hz for hz in _COMMAND_HZ if hz <= state_hz]
     command_hz = state_hz if rng.random() < 0.4 else float(rng.choice(slower))
-    effort: Effort = "none"
     kind = rng.random()
-    if kind > 0.6:
-        effort = rng.choice(["measured", "commanded", "current"])
+    efforts: tuple[Effort, ...] = ("measured", "commanded", "current")
+    effort: Effort = efforts[int(rng.integers(3))] if kind > 0.6 else "none"
     return Recorder(
         state_hz=state_hz, command_hz=command_hz, state_s=_stamp(rng, state_hz), command_s=_stamp(rng, command_hz),
         length_s=float(rng.choice([8.0, 10.0, 12.0, 16.0, 20.0])),
-        resolution=2.0 * np.pi / 2.0 ** int(rng.integers(12, 18)), velocity=bool(kind > 0.4), effort=str(effort),
+        resolution=2.0 * np.pi / 2.0 ** int(rng.integers(12, 18)), velocity=bool(kind > 0.4), effort=effort,
         torque_constant=round(float(rng.uniform(0.5, 12.0)), 2) if effort == "current" else 1.0,
     )  # fmt: skip
 
@@ -176,14 +175,9 @@ def _draw_servo(rng: Rng, robot: Description, model: pin.Model, commands: Comman
 
 def _mass(model: pin.Model, data: pin.Data, q: Matrix) -> Matrix:
     upper = np.triu(pin.crba(model, data, q))
-    return upper + np.triu(upper, 1).T
+    return np.asarray(upper + np.triu(upper, 1).T)
 
 
 def rounded(values: Matrix, digits: int = 3) -> Matrix:
     """Numbers as people write them."""
     return np.array([float(f"{value:.{digits}g}") for value in values])
-
-
-def with_servo(machine: Machine, **changes: Matrix) -> Machine:
-    """The machine with other numbers in its servo."""
-    return replace(machine, servo=replace(machine.servo, **changes))

@@ -81,9 +81,9 @@ def severity(scene: Scene, difference: Matrix, motion: Motion, *, but: int = -1)
     table = smooth(columns, rate_hz).transpose(0, 2, 1).reshape(lacks.size, -1)
     q, r = np.linalg.qr(table)
     within = lsq_linear(r, q.T @ lacks, bounds=(-_MOST_SIGMAS, _MOST_SIGMAS)).x
-    return tuple(
-        float(np.linalg.norm(each) / np.sqrt(lacks.size / noise.size)) for each in (lacks, lacks - table @ within)
-    )
+    samples = lacks.size / noise.size
+    left = lacks - table @ within
+    return float(np.linalg.norm(lacks) / np.sqrt(samples)), float(np.linalg.norm(left) / np.sqrt(samples))
 
 
 def _inertia_columns(scene: Scene, motion: Motion, but: int) -> Matrix:

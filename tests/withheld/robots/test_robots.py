@@ -15,7 +15,8 @@ pytest.importorskip("scipy")
 from chladni_withheld.campaign import make_cases  # noqa: E402 - behind what may be missing
 from chladni_withheld.folders import case_folders, truth_of_case  # noqa: E402
 from chladni_withheld.marking import mark  # noqa: E402
-from chladni_withheld.robots.causes import CAUSES, OUTSIDE_CAUSES, Stage  # noqa: E402
+from chladni_withheld.robots.cause import Stage  # noqa: E402
+from chladni_withheld.robots.causes import OUTSIDE_CAUSES  # noqa: E402
 from chladni_withheld.robots.descriptions import SOURCES, describe  # noqa: E402
 from chladni_withheld.robots.draw import ALL_CAUSES, draw_case  # noqa: E402
 from chladni_withheld.robots.scene import RefusedError, draw_scene  # noqa: E402
@@ -181,16 +182,15 @@ def test_a_description_that_was_changed_breaks_the_seal(campaign):
 
 
 def answer(*causes, verdict="effect", **further):
-    told = [
-        {"effect": effect, "site": site, "probability": 0.95, "parameters": numbers}
-        for effect, site, numbers in causes
-    ]
+    keys = ("effect", "site", "parameters")
+    told = [{"probability": 0.95, **dict(zip(keys, one, strict=True))} for one in causes]
     return {"format": "chladni.gap/1", "verdict": verdict, "causes": told, **further}
 
 
 def test_what_says_the_same_is_right():
     truth = {"kind": "effect", "ratio": 9.0, "effects": [
-        {"effect": "payload", "site": "hand", "parameters": {"mass": 1.0}, "also": [{"effect": "parameter", "site": "hand.mass"}]}
+        {"effect": "payload", "site": "hand", "parameters": {"mass": 1.0},
+         "also": [{"effect": "parameter", "site": "hand.mass"}]}
     ]}  # fmt: skip
     assert mark("x", truth, answer(("payload", "hand", {"mass": {"value": 1.04}}))).is_right
     assert mark("x", truth, answer(("parameter", "hand.mass", {}))).all_found()
@@ -213,7 +213,8 @@ def test_numbers_of_causes_are_held_against_the_truth():
 def test_doubtful_gains_are_no_wrong_names():
     truth = {"kind": "gains", "ratio": 9.0, "effects": [{"effect": "viscous_friction", "site": "j0"}],
              "gains": {"j0": {"kp": 1.1, "kd": 0.9}, "j1": {"kp": 1.2, "kd": 1.0}}}  # fmt: skip
-    said = answer(("controller_gain", "j1", {"kp": {"value": 1.19}, "kd": {"value": 1.0}}), ("viscous_friction", "j0", {}),
+    said = answer(("controller_gain", "j1", {"kp": {"value": 1.19}, "kd": {"value": 1.0}}),
+                  ("viscous_friction", "j0", {}),
                   tuned_parameters={"j0.kp": {"nominal": 100.0, "value": 111.0}})  # fmt: skip
     one = mark("x", truth, said)
     assert one.is_right
@@ -230,12 +231,9 @@ def test_doubtful_gains_are_no_wrong_names():
 ])  # fmt: skip
 def test_a_push_is_told_with_its_place_and_time(where, told):
     truth = {"kind": "outside", "ratio": 9.0, "effects": [
-        {"effect": "push", "site": "hand", "parameters": {"start": 3.0, "end": 3.5}, "also": [{"effect": "push", "site": "j1"}]}
+        {"effect": "push", "site": "hand", "parameters": {"start": 3.0, "end": 3.5},
+         "also": [{"effect": "push", "site": "j1"}]}
     ]}  # fmt: skip
     one = mark("x", truth, answer(verdict="unknown", where=where))
     assert one.told is told
     assert scored([one])["robots"]["push"]["right"] == int(told)
-
-
-def test_words_are_those_of_the_contract():
-    assert not set(CAUSES) & set(OUTSIDE_CAUSES)
