@@ -38,8 +38,15 @@ def _networks() -> Generator:
     return Generator(composition=DEFAULT, draws=partial(one_by_one, draw_case))
 
 
+def _robots() -> Generator:
+    from chladni_withheld.robots.draw import DEFAULT, draw_case
+
+    return Generator(composition=DEFAULT, draws=partial(one_by_one, draw_case))
+
+
 #: Generators by name; each is imported when it's asked for.
-GENERATORS: Mapping[str, Callable[[], Generator]] = {"chains": _chains, "networks": _networks}
+GENERATORS: Mapping[str, Callable[[], Generator]] = {"chains": _chains, "networks": _networks,
+                                                      "robots": _robots}  # fmt: skip
 
 
 def generator_of(name: str) -> Generator:
@@ -186,9 +193,13 @@ def _make_case(directory: Path, task: tuple[str, Callable[[], WithheldCase], lis
     name, draw, seed = task
     case = draw()
     folder = made_folder(directory / "cases" / name)
-    with atomic_write(folder / "model.toml") as file:
-        file.write(case.model_toml.encode())
-    write_mcap(_log_of(case), folder / "log.mcap", layout="batches")
+    for path, text in {case.model_file: case.model, **case.beside}.items():
+        with atomic_write(folder / path) as file:
+            file.write(text.encode())
+    if case.topics:
+        write_mcap(case.topics, folder / "log.mcap")
+    else:
+        write_mcap(_log_of(case), folder / "log.mcap", layout="batches")
     seal_case(directory, name, {**truth_of(case), "seed": seed}, leave_out=case.leave_out)
 
 
@@ -209,7 +220,8 @@ def truth_of(case: WithheldCase) -> dict[str, Any]:
         "kind": case.kind,
         "effects": [
             {"effect": one.effect, "site": one.site, "law": one.law, "parameters": dict(one.parameters),
-             "from": one.source, "severity": one.severity, "severity_tuned": one.severity_tuned}
+             "from": one.source, "severity": one.severity, "severity_tuned": one.severity_tuned,
+             **({"also": [{"effect": word, "site": site} for word, site in one.also]} if one.also else {})}
             for one in case.effects
         ],
         "off": dict(case.off),

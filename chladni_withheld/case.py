@@ -7,15 +7,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.time_series import TimeSeries
+
 Matrix = NDArray[np.float64]
 #: What a case asks for. ``effect``: one clear effect. ``none``: nothing is missing, all numbers inside three sigma.
 #: ``parameters``: one number a few sigma outside its tolerance. ``two``, ``three``: that many effects. ``faint``: one
 #: effect near or under the noise. ``leave_out``: one whose word the catalogue must not hold. ``outside``: one that no
 #: word fits. ``topology``: a link that the model lacks. ``value``: one number or several wrong by up to a factor of
-#: ten. ``value_and_effect``: wrong numbers and effects together.
+#: ten. ``value_and_effect``: wrong numbers and effects together. Of robots: ``all_joints``: friction in every joint.
+#: ``ordinary``: friction, a common delay and a heavier link. ``gains``: one effect, and a servo of unknown gains.
 Kind = Literal[
     "effect", "none", "parameters", "two", "three", "faint", "leave_out", "outside", "topology", "value",
-    "value_and_effect",
+    "value_and_effect", "all_joints", "ordinary", "gains",
 ]  # fmt: skip
 #: Effect of a wrong number; its site is the number's name, such as ``elbow.stiffness``.
 PARAMETER = "parameter"
@@ -64,6 +67,8 @@ class HiddenEffect:
     severity, severity_tuned
         Pooled RMS change of the outputs by this effect alone, over the pooled noise, and what is left of it when the
         model's numbers are tuned inside their tolerances; None when unknown.
+    also
+        Further words and sites that say the same of this log.
     """
 
     effect: str
@@ -73,6 +78,7 @@ class HiddenEffect:
     source: str | None = None
     severity: float | None = None
     severity_tuned: float | None = None
+    also: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,10 +89,12 @@ class WithheldCase:
     ----------
     kind
         What was asked for.
-    model_toml
-        Text of the nominal model's file.
+    model, model_file, beside
+        Text of the nominal model's file, its name, and the text of the files that it names.
     sample_rate_hz, channels, start_time_ns
-        The log.
+        The log, of channels that share a rate.
+    topics
+        The log, of messages at rates of their own; in place of channels.
     effects
         What is hidden; empty in a case ``none`` or ``parameters``.
     off
@@ -117,9 +125,12 @@ class WithheldCase:
     """
 
     kind: Kind
-    model_toml: str
-    sample_rate_hz: float
-    channels: tuple[LoggedChannel, ...]
+    model: str
+    model_file: str = "model.toml"
+    beside: Mapping[str, str] = field(default_factory=dict)
+    sample_rate_hz: float = 0.0
+    channels: tuple[LoggedChannel, ...] = ()
+    topics: tuple[TimeSeries, ...] = ()
     start_time_ns: int = START_TIME_NS
     effects: tuple[HiddenEffect, ...] = ()
     off: Mapping[str, float] = field(default_factory=dict)

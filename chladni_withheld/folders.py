@@ -23,7 +23,7 @@ from chladni.io.validation import ModelT, validated
 from chladni.signals.errors import SetupError
 from chladni.signals.wording import MOST_SHOWN, counted, shown
 from chladni_withheld.case import Kind
-from chladni_withheld.vocabulary import WORDS
+from chladni_withheld.vocabulary import FAMILY_OF
 
 RESULT_FORMAT, FAILURE_FORMAT = "chladni.gap/1", "chladni.blind-failure/1"
 _MOST_TOLD = 3
@@ -34,7 +34,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 def _word(text: str) -> str:
-    if text not in WORDS:
+    if text not in FAMILY_OF:
         raise ValueError("must be an effect of the vocabulary")
     return text
 
@@ -80,6 +80,14 @@ class Named(_Document):
     site: Text
 
 
+class Hidden(Named):
+    """What was hidden: its numbers, how clear it is, and what else says the same."""
+
+    parameters: dict[str, Any] | None = None
+    severity_tuned: Number | None = None
+    also: list[Named] | None = None
+
+
 class SealedCase(_Document):
     """``chladni.blind-case/1``."""
 
@@ -91,13 +99,14 @@ class Truth(_Document):
     """``chladni.blind-truth/1``: what was hidden, how far it is off the noise, and what was sealed with it."""
 
     kind: Kind
-    effects: list[Named]
+    effects: list[Hidden]
     coloured: bool = False
     off: dict[str, Any] | None = None
     ratio: Number | None = None
     ratio_tuned: Number | None = None
     ideal: Annotated[float, Field(gt=0.0)] | None = None
     files: dict[str, str] | None = None
+    gains: dict[str, dict[str, float]] | None = None
 
     @model_validator(mode="after")
     def _hides_something(self) -> Self:
@@ -118,6 +127,7 @@ class Cause(Named):
     group: list[Text] | None = None
     probability: Share | None = None
     alternatives: list[OtherEffect] | None = None
+    parameters: dict[str, Any] | None = None
 
 
 class Ranked(Named):
@@ -140,10 +150,14 @@ class Result(_Document):
     ranking: list[Ranked] | None = None
     naive: Named | None = None
     gap: Gap | None = None
+    where: dict[str, Any] | None = None
+    tuned_parameters: dict[str, Any] | None = None
 
 
 CASE_FORMAT, TRUTH_FORMAT = "chladni.blind-case/1", "chladni.blind-truth/1"
-SEALED_FILES = ("model.toml", "log.mcap")
+MODEL_FILES, LOG_FILE = ("robot.toml", "model.toml"), "log.mcap"
+#: What a robot file names: its description.
+_BESIDE = ("*.urdf", "*.xml")
 _SALT_BYTES = 32
 
 
@@ -204,14 +218,12 @@ def seal_case(directory: Path, name: str, truth: Mapping[str, Any], *, leave_out
         When the truth or the seal can't be written.
     """
     case = directory / "cases" / name
-    for file in SEALED_FILES:
-        if not (case / file).is_file():
-            raise SetupError(f"{case / file}: isn't there; a case is a model and a log")
+    model, log = _model_and_log(case)
     for key in ("kind", "effects"):
         if key not in truth:
             raise SetupError(f"{name}: the truth has no {key!r}; it needs kind and effects")
     # With the files: an answer to another model than the sealed one says nothing of the truth.
-    files = {file: checksum(case / file) for file in SEALED_FILES}
+    files = _checksums(model, log)
     sealed = {**truth, "files": files, "format": TRUTH_FORMAT, "salt": new_salt()}
     seal = seal_of(sealed)
     write_json(made_folder(directory / "truth") / f"{name}.json", sealed)
@@ -284,10 +296,7 @@ def case_folders(directory: Path) -> list[CaseFolder]:
 
 def _folder(path: Path) -> CaseFolder:
     content = read_json(path, CASE_FORMAT)
-    model, log = (path.with_name(file) for file in SEALED_FILES)
-    for file in (model, log):
-        if not file.is_file():
-            raise SetupError(f"{file}: isn't there; a case is a model and a log")
+    model, log = _model_and_log(path.parent)
     case = read_as(SealedCase, content, str(path), "seal the case again")
     return CaseFolder(
         name=path.parent.name, model=model, log=log, seal=case.seal, leave_out=frozenset(case.leave_out)
@@ -317,9 +326,23 @@ def truth_of_case(directory: Path, case: CaseFolder) -> Mapping[str, Any]:
     return truth
 
 
+def _model_and_log(folder: Path) -> tuple[Path, Path]:
+    models = [folder / file for file in MODEL_FILES]
+    model, log = next((file for file in models if file.is_file()), models[-1]), folder / LOG_FILE
+    for file in (model, log):
+        if not file.is_file():
+            raise SetupError(f"{file}: isn't there; a case is a model and a log")
+    return model, log
+
+
 def checksums(case: CaseFolder) -> dict[str, str]:
-    """SHA-256 of a case's model and log, by the names of the files."""
-    return {file.name: checksum(file) for file in (case.model, case.log)}
+    """SHA-256 of a case's model, its log, and the descriptions beside them, by the names of the files."""
+    return _checksums(case.model, case.log)
+
+
+def _checksums(model: Path, log: Path) -> dict[str, str]:
+    beside = sorted(file for kind in _BESIDE for file in model.parent.glob(kind))
+    return {file.name: checksum(file) for file in (model, log, *beside)}
 
 
 def require_files(case: CaseFolder, sealed: Mapping[str, str]) -> None:
@@ -330,10 +353,11 @@ def require_files(case: CaseFolder, sealed: Mapping[str, str]) -> None:
     SetupError
         With the file, when its checksum is another.
     """
-    for name, found in checksums(case).items():
-        if sealed.get(name) != found:
+    found = checksums(case)
+    for name in sorted({*found, *sealed}):
+        if sealed.get(name) != found.get(name):
             raise SetupError(
-                f"{case.model.with_name(name)}: isn't what was sealed: an answer to it can't be scored; put the "
+                f"{case.model.parent / name}: isn't what was sealed: an answer to it can't be scored; put the "
                 "sealed one back, and run the case again"
             )
 

@@ -1,7 +1,8 @@
 """Marks one answer against the truth."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,12 @@ CLEAR_RATIO = 3.0
 #: Cases that no word of the run's catalogue is right for, and cases whose model is wrong in itself.
 STRANGE: tuple[Kind, ...] = ("leave_out", "outside")
 MODEL_WRONG: tuple[Kind, ...] = ("topology", "value", "value_and_effect")
-_NAMEABLE: tuple[Kind, ...] = ("effect", "parameters", "two", "three", *MODEL_WRONG)
+ROBOTS_OWN: tuple[Kind, ...] = ("all_joints", "ordinary", "gains")
+_NAMEABLE: tuple[Kind, ...] = ("effect", "parameters", "two", "three", *MODEL_WRONG, *ROBOTS_OWN)
+#: The number of a robot's cause that is held against the truth, and whether as a share of it.
+_VALUES: Mapping[str, tuple[str, bool]] = {
+    "delay": ("delay", False), "payload": ("mass", True), "coulomb_friction": ("force", True),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +64,15 @@ class Mark:
         Effect over noise, before and after tuning; None when nothing was hidden.
     closed
         Share of the gap that was closed, over what the true law closes; None when the answer has none.
+    faint_too
+        Of what is hidden in all joints, what is too faint to be asked for.
+    values
+        How far a cause's own number is off, by what was hidden: seconds of a delay, shares of others; infinite where
+        it wasn't named.
+    gains
+        How far each unknown gain of a servo is off, as a share.
+    told
+        Whether an answer ``unknown`` says where, and of a push when.
     """
 
     name: str
@@ -72,6 +87,10 @@ class Mark:
     ratio_tuned: float | None
     closed: float | None
     alternatives: tuple[str, ...] = ()
+    faint_too: tuple[tuple[str, str], ...] = ()
+    values: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    gains: tuple[float, ...] = ()
+    told: bool = False
 
     @property
     def named(self) -> tuple[Cause, ...]:
@@ -133,12 +152,12 @@ class Mark:
     def found(self, *, least: float = 0.0) -> int:
         """How many of the hidden effects and values were named at their sites, with a probability of `least`."""
         return sum(
-            any(cause.fits(*one) and cause.probability >= least for cause in self.named) for one in self._true_causes
+            any(cause.fits(*one) and cause.probability >= least for cause in self.named) for one in self._asked
         )
 
     def all_found(self, *, least: float = 0.0) -> bool:
         """Whether all that is hidden was named, at its sites."""
-        return self.found(least=least) == len(self._true_causes)
+        return self.found(least=least) == len(self._asked)
 
     def wrongly_named(self, least: float) -> bool:
         """Whether anything was named, with a probability of `least` or more, that isn't true."""
@@ -156,6 +175,10 @@ class Mark:
     @property
     def _true_causes(self) -> tuple[tuple[str, str], ...]:
         return (*self.hidden, *((PARAMETER, name) for name in self.off if (PARAMETER, name) not in self.hidden))
+
+    @property
+    def _asked(self) -> tuple[tuple[str, str], ...]:
+        return tuple(one for one in self._true_causes if one not in self.faint_too)
 
     def _is_true(self, cause: Cause) -> bool:
         if self.kind in STRANGE:
@@ -191,28 +214,95 @@ def mark(name: str, truth: Mapping[str, Any], result: Mapping[str, Any], *, path
 
 def _marked(name: str, truth: Truth, result: Result | None) -> Mark:
     answer = result or Result(verdict="unknown")
-    named = answer.causes or ()
+    hidden = {(one.effect, _ordered(one.site)): one for one in truth.effects}
+    named = [(_cause(one, hidden), one) for one in answer.causes or () if not _is_a_doubtful_gain(one, truth)]
     closed = answer.gap.closed if answer.gap else None
-    first = next((one for one in named if one.effect != PARAMETER), None)
+    first = next((one for cause, one in named if cause.effect != PARAMETER), None)
+    clear = (one.severity_tuned is None or one.severity_tuned >= CLEAR_RATIO for one in hidden.values())
     return Mark(
         name=name,
         kind=truth.kind,
         coloured=truth.coloured,
-        hidden=tuple((one.effect, _ordered(one.site)) for one in truth.effects),
+        hidden=tuple(hidden),
         off=tuple(truth.off or ()),
         verdict=answer.verdict if result else FAILED,
-        causes=tuple(_cause(one) for one in named),
+        causes=tuple(cause for cause, _ in named),
         naive=_naive(answer),
         ratio=truth.ratio,
         ratio_tuned=truth.ratio_tuned,
         closed=None if closed is None else closed / (truth.ideal or 1.0),
         alternatives=tuple(one.effect for one in (first.alternatives or () if first else ())),
+        faint_too=tuple(
+            key for key, seen in zip(hidden, clear, strict=True) if not seen and truth.kind == "all_joints"
+        ),
+        values={key: _off(one, named) for key, one in hidden.items() if one.effect in _VALUES},
+        gains=tuple(
+            abs(_gain(answer, joint, key) / value - 1.0)
+            for joint, both in (truth.gains or {}).items()
+            for key, value in both.items()
+        ),
+        told=answer.verdict == "unknown" and any(_tells(answer, one) for one in truth.effects),
     )
 
 
-def _cause(one: folders.Cause) -> Cause:
-    return Cause(effect=one.effect, site=_ordered(one.site), group=tuple(_ordered(site) for site in one.group or ()),
-                 probability=one.probability or 0.0)  # fmt: skip
+def _cause(one: folders.Cause, hidden: Mapping[tuple[str, str], folders.Hidden]) -> Cause:
+    """The cause, under the name of what was hidden where that says the same."""
+    sites = tuple(_ordered(site) for site in (one.site, *(one.group or ())))
+    for (effect, site), truth in hidden.items():
+        if any(other.effect == one.effect and _ordered(other.site) in sites for other in truth.also or ()):
+            return Cause(effect=effect, site=site, group=(), probability=one.probability or 0.0)
+    return Cause(effect=one.effect, site=sites[0], group=sites[1:], probability=one.probability or 0.0)
+
+
+def _is_a_doubtful_gain(one: folders.Cause, truth: Truth) -> bool:
+    """Whether it's a servo's gain that the robot file doubts: true, and not the cause that is asked for."""
+    return one.effect == "controller_gain" and one.site in (truth.gains or {})
+
+
+def _off(hidden: folders.Hidden, named: Sequence[tuple[Cause, folders.Cause]]) -> float:
+    """How far the number of what was hidden is off."""
+    key, as_share = _VALUES[hidden.effect]
+    true = (hidden.parameters or {}).get(key)
+    said = next((one for cause, one in named if cause.fits(hidden.effect, _ordered(hidden.site))), None)
+    found = _number((said.parameters or {}).get(key)) if said else None
+    if found is None or not true:
+        return inf
+    return abs(found - float(true)) / (abs(float(true)) if as_share else 1.0)
+
+
+def _number(told: object) -> float | None:
+    """A number of an answer, bare or with its sigma and unit."""
+    value = told.get("value") if isinstance(told, Mapping) else told
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _gain(answer: Result, joint: str, key: str) -> float:
+    """What an answer says a servo's gain is over the one believed: a cause, a tuned number, or as believed."""
+    for one in answer.causes or ():
+        if one.effect == "controller_gain" and one.site == joint:
+            return _number((one.parameters or {}).get(key)) or 1.0
+    tuned = (answer.tuned_parameters or {}).get(f"{joint}.{key}")
+    value, nominal = _number(tuned), _number(tuned.get("nominal")) if isinstance(tuned, Mapping) else None
+    return value / nominal if value and nominal else 1.0
+
+
+def _tells(answer: Result, hidden: folders.Hidden) -> bool:
+    """Whether an answer names the place of what no word says: a force that it tells of, or the largest share."""
+    sites = {site for one in (hidden, *(hidden.also or ())) for site in one.site.split("~")}
+    where = answer.where or {}
+    shares = [one for one in where.get("sites") or () if isinstance(one, Mapping)]
+    largest = max(shares, key=lambda one: _number(one.get("share")) or 0.0, default={})
+    forces = [one for one in answer.causes or () if one.effect == "external_force"]
+    placed = largest.get("name") in sites or any(one.site in sites for one in forces)
+    if hidden.effect != "push":
+        return placed
+    spans = [
+        (_number((one.parameters or {}).get("start")), _number((one.parameters or {}).get("end"))) for one in forces
+    ]
+    spans += [(_number(one.get("low")), _number(one.get("high"))) for one in where.get("regimes") or ()
+              if isinstance(one, Mapping) and one.get("variable") == "time"]  # fmt: skip
+    middle = 0.5 * sum(float((hidden.parameters or {}).get(key, inf)) for key in ("start", "end"))
+    return placed and any(low is not None and high is not None and low <= middle <= high for low, high in spans)
 
 
 def _ordered(site: str) -> str:

@@ -123,7 +123,7 @@ class Question:
     what
         In words, as a row of the table.
     of, counts
-        Which cases it's a share of, by their truths alone, and which of those count.
+        Which cases it's a share of, by their truths alone, and which of those count; of parts of cases, which parts.
     at_least, at_most
         What must be, where anything must.
     optional
@@ -133,10 +133,15 @@ class Question:
     key: str
     what: str
     of: Callable[[Mark], bool]
-    counts: Callable[[Mark], bool]
+    counts: Callable[[Mark], bool | Sequence[bool]]
     at_least: float | None = None
     at_most: float | None = None
     optional: bool = False
+
+    def flags(self, marks: Sequence[Mark]) -> list[bool]:
+        """Whether each case that it's a share of counts, or each of its parts."""
+        found = [self.counts(one) for one in marks if self.of(one)]
+        return [flag for one in found for flag in ([one] if isinstance(one, bool) else one)]
 
 
 def _clear(one: Mark) -> bool:
@@ -171,9 +176,23 @@ def _wrong(least: float) -> Callable[[Mark], bool]:
     return lambda one: one.wrongly_named(least)
 
 
+def _hides(word: str, site: str = "", kind: Kind = "effect") -> Callable[[Mark], bool]:
+    """Whether a case hides this alone, at that site or anywhere."""
+    return lambda one: one.kind == kind and one.is_clear and any(
+        effect == word and site in ("", at) for effect, at in one.hidden
+    )  # fmt: skip
+
+
+def _values_within(word: str, most: float) -> Callable[[Mark], Sequence[bool]]:
+    return lambda one: [
+        off <= most for key, off in one.values.items() if key[0] == word and key not in one.faint_too
+    ]  # fmt: skip
+
+
 QUESTIONS = (
     Question(key="effect", what="right effect, first place", of=_clear, counts=lambda one: one.word_is_right,
              at_least=0.95),
+    Question(key="effect_at_site", what="right effect at the right site", of=_clear, counts=lambda one: one.is_right),
     Question(key="effect_or_alternative", what="right effect, or told to be like the named one", of=_clear,
              counts=lambda one: one.is_among_the_alike),
     Question(key="family", what="right family", of=_clear, counts=lambda one: one.family_is_right, at_least=0.96),
@@ -228,6 +247,23 @@ QUESTIONS = (
              counts=_all_found, optional=True),
     Question(key="model_wrong.wrong", what="a wrong model: a wrong name with 0.6 or more", of=_of(*MODEL_WRONG),
              counts=_wrong(0.6), at_most=0.02, optional=True),
+    Question(key="robots.joints", what="friction in all joints: named, and within 20 %, of the joints",
+             of=_of("all_joints"), counts=_values_within("coulomb_friction", 0.20), at_least=0.90, optional=True),
+    Question(key="robots.ordinary", what="friction, common delay and a heavier link: all told", of=_of("ordinary"),
+             counts=_all_found, at_least=1.0, optional=True),
+    Question(key="robots.gains_site", what="unknown gains: the cause's site", of=_of("gains"),
+             counts=lambda one: one.site_is_right, at_least=0.85, optional=True),
+    Question(key="robots.gains", what="unknown gains: each within 5 %", of=_of("gains"),
+             counts=lambda one: [off <= 0.05 for off in one.gains], optional=True),
+    Question(key="robots.delay", what="a common delay: within 1 ms", of=_hides("delay", "all commands"),
+             counts=_values_within("delay", 0.001), optional=True),
+    Question(key="robots.payload", what="a payload: within 5 %", of=_hides("payload"),
+             counts=_values_within("payload", 0.05), optional=True),
+    Question(key="robots.push", what="a push: unknown, with its place and time", of=_hides("push", kind="outside"),
+             counts=lambda one: one.told, optional=True),
+    Question(key="robots.coupled", what="joints that are coupled: unknown, with one of them",
+             of=lambda one: any(word.startswith("coupled_") for word, _ in one.hidden), counts=lambda one: one.told,
+             optional=True),
 )  # fmt: skip
 
 
@@ -292,7 +328,7 @@ def paired(pairs: Sequence[tuple[Mark, Mark]]) -> dict[str, Any]:
     """
     rows = []
     for question in QUESTIONS:
-        counted = [(question.counts(here), question.counts(there)) for here, there in pairs if question.of(here)]
+        counted = list(zip(*(question.flags(side) for side in zip(*pairs, strict=True)), strict=True))
         only = Counter(counted)
         here, there = only[True, False], only[False, True]
         rows.append({
@@ -323,7 +359,7 @@ def scored(marks: Sequence[Mark]) -> dict[str, Any]:
     }
     for question in QUESTIONS:
         outer, _, inner = question.key.partition(".")
-        share = share_of([question.counts(one) for one in marks if question.of(one)]).told()
+        share = share_of(question.flags(marks)).told()
         if inner:
             score.setdefault(outer, {})[inner] = share
         else:

@@ -17,8 +17,19 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
                "quantization", "anti_alias", "clock_drift", "swapped_channels", "offset"),
     "disturbance": ("base_vibration", "tonal_disturbance", "unbalance"),
 }  # fmt: skip
-FAMILY_OF: Mapping[str, str] = {word: family for family, words in FAMILIES.items() for word in words}
-WORDS: tuple[str, ...] = tuple(FAMILY_OF)
+#: Words that only robots have, beside those above.
+ROBOT_FAMILIES: Mapping[str, tuple[str, ...]] = {
+    "friction": ("viscous_friction", "load_friction"),
+    "stiffness": ("joint_elasticity", "joint_spring"),
+    "attachment": ("armature", "payload"),
+    "actuator": ("controller_gain",),
+    "sensor": ("encoder_offset", "misalignment"),
+    "disturbance": ("gravity_tilt", "external_force"),
+}
+FAMILY_OF: Mapping[str, str] = {
+    word: family for words_of in (FAMILIES, ROBOT_FAMILIES) for family, words in words_of.items() for word in words
+}
+WORDS: tuple[str, ...] = tuple(word for words in FAMILIES.values() for word in words)
 #: Outside the vocabulary, each with the family whose words are a fair near miss; empty where none is.
 OUTSIDE: Mapping[str, str] = {
     "viscoelastic": "",
@@ -31,4 +42,7 @@ OUTSIDE: Mapping[str, str] = {
     "fluid_coupling": "coupling",
     "drifting_gain": "sensor",
     "rectified_crosstalk": "sensor",
+    "push": "",
+    "coupled_spring": "",
+    "coupled_friction": "friction",
 }

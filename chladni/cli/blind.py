@@ -30,7 +30,7 @@ Kinds = Annotated[
     typer.Option(
         metavar="KIND=N",
         help="Share of a kind of cases, and of no others: effect, none, parameters, two, three, faint, leave_out, "
-        "outside, topology, value, value_and_effect, as far as the generator draws them; may be repeated. Its usual "
+        "outside, topology, value, value_and_effect, all_joints, ordinary, gains, as far as the generator draws them; may be repeated. Its usual "
         "ones if not given.",
         show_default=False,
     ),
@@ -44,8 +44,11 @@ def make(
     count: Annotated[int, typer.Option(metavar="N", min=1, help="Number of cases.")] = 200,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random in them.")] = 0,
     generator: Annotated[
-        str, typer.Option(metavar="NAME", help="What draws the machines: chains, networks.")
+        str, typer.Option(metavar="NAME", help="What draws the machines: chains, networks, robots.")
     ] = "chains",
+    robots: Annotated[
+        bool, typer.Option("--robots", help="Robots with JointState logs: --generator robots.")
+    ] = False,
     kind: Kinds = None,
     jobs: Jobs = None,
     json: options.Json = None,
@@ -55,6 +58,7 @@ def make(
 
     require_places(reads=(), writes={"--json": json}, folders={"DIR": directory})
     to = Output(json)
+    generator = "robots" if robots else generator
     with to.progress("making cases") as show:
         made = make_campaign(
             directory, count=count, seed=seed, generator=generator, kinds=kind or (), jobs=jobs, progress=show

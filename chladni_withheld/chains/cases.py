@@ -312,7 +312,7 @@ def _withheld(case: Case) -> WithheldCase:
     ratios = case.ratios or (None,) * len(case.effects)
     tuned = case.ratios_tuned or (case.ratio_tuned,) * len(case.effects)
     return WithheldCase(
-        kind=case.order.kind, model_toml=model_text(case.bench.plan), sample_rate_hz=case.bench.rate_hz,
+        kind=case.order.kind, model=model_text(case.bench.plan), sample_rate_hz=case.bench.rate_hz,
         channels=channels_of(case), off=case.off, parameters=case.numbers,
         effects=tuple(
             HiddenEffect(effect=one.effect, site=one.site, law=one.law, parameters=one.numbers,

@@ -64,7 +64,7 @@ def _written(kind: Kind, rng: Rng, plot: Plot, refused: list[str]) -> WithheldCa
     wrong = tuple(_wrong_number(plot, name) for name in plot.wrong)
     return WithheldCase(
         kind=kind,
-        model_toml=model_text(plot.stated, scene.tolerances, scene.hold if states_hold else None),
+        model=model_text(plot.stated, scene.tolerances, scene.hold if states_hold else None),
         sample_rate_hz=scene.grid.rate_hz,
         channels=channels(scene.network, inputs, outputs),
         effects=tuple(map(_told, plot.hidden)) + (() if kind == "parameters" else wrong),

@@ -117,7 +117,7 @@ def draw_table(seed, index, kind):
     rng = np.random.default_rng((seed, index))
     hidden = HiddenEffect(effect=PARAMETER, site="leg.stiffness", parameters={"nominal": 1.0, "true": 10.0})
     return WithheldCase(
-        kind=kind, model_toml=f"# {index}\n", sample_rate_hz=100.0, effects=(hidden,) if kind == "value" else (),
+        kind=kind, model=f"# {index}\n", sample_rate_hz=100.0, effects=(hidden,) if kind == "value" else (),
         channels=(LoggedChannel(name="/daq.f", unit="N", samples=rng.standard_normal(50), drives=True),
                   LoggedChannel(name="/daq.a", unit="m/s^2", samples=np.zeros(50))),
         leave_out=("lag", "delay"), further={"legs": 4},
