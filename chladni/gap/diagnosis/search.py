@@ -16,10 +16,8 @@ from chladni.gap.calibration import (
     FORMS,
     ITERATIONS,
     LEADS,
-    LITTLE,
     MANY,
     PLACES,
-    RIDGE,
     WORTH,
 )
 from chladni.gap.diagnosis.belief import Belief
@@ -28,7 +26,6 @@ from chladni.gap.diagnosis.pairs import exchanged, paired_causes, second_causes,
 from chladni.gap.diagnosis.plausible import is_lost, is_one_force, least_left, plausible_places, sound
 from chladni.gap.diagnosis.study import Study, contest_over, over_model
 from chladni.gap.diagnosis.told_holds import other_holds
-from chladni.gap.explanation.any_law import left_by_any_law
 from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.hypotheses import (
     effect_hypotheses,
@@ -91,22 +88,9 @@ class Search:
     def add(self, entered: Sequence[Contestant]) -> bool:
         """Take sound contestants in; whether the most probable one is another now."""
         before = self.best
-        self.found += [one for one in sound(self.study, entered) if not self._has_no_memory(one)]
+        self.found += sound(self.study, entered)
         self.__dict__.pop("belief", None)
         return self.best is not before
-
-    def _has_no_memory(self, one: Contestant) -> bool:
-        """Whether of what an only loop leaves a law of displacement and velocity alone would leave hardly any."""
-        study, effects = self.study, one.hypothesis.effects
-        if study.windows is not None or len(effects) != 1 or not effects[0].kind.clues.is_loop:
-            return False
-        site = effects[0].site
-        if site not in self._left_without_memory:
-            there = ((each, where) for each in study.location.ranked for where in each.places[0].sites)
-            at = next((found for found in there if found[1].name == site), None)
-            self._left_without_memory[site] = 1.0 if at is None else left_by_any_law(study.location, *at)
-        gap = max(study.location.tuned.chi - 1.0, RIDGE)
-        return self._left_without_memory[site] < LITTLE * (one.left.over_noise - 1.0) / gap
 
     def enter(self, hypotheses: Sequence[Hypothesis], progress: Step | None = None) -> bool:
         """Fit hypotheses and take them in, but for forms that were fitted before."""
@@ -132,7 +116,6 @@ class Search:
     def begin_anew(self, study: Study, found: list[Contestant]) -> None:
         """Take another study of the log, with contestants that were weighed in it, that without a cause first."""
         self.study, self.found, self.nothing = study, found, found[0]
-        self._left_without_memory: dict[str, float] = {}
         self.__dict__.pop("belief", None)
 
     def run(self, progress: Step) -> None:
