@@ -30,8 +30,8 @@ Kinds = Annotated[
     typer.Option(
         metavar="KIND=N",
         help="Share of a kind of cases, and of no others: effect, none, parameters, two, three, faint, leave_out, "
-        "outside, topology, value, value_and_effect, all_joints, ordinary, gains, as far as the generator draws "
-        "them; may be repeated. Its usual ones if not given.",
+        "outside, topology, value, value_and_effect, all_joints, "
+        "ordinary, gains, as far as the generator draws them; may be repeated. Its usual ones if not given.",
         show_default=False,
     ),
 ]
