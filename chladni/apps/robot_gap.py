@@ -33,11 +33,11 @@ def robot_gap(
 ) -> Diagnosis:
     """Diagnose a robot; see `chladni.diagnose_gap`."""
     # numba and MuJoCo take a moment to load, which a look at the façade shouldn't pay for.
-    from chladni.gap.robots.diagnose import ROBOT_WORDS, diagnose_robot
+    from chladni.gap.robots.diagnose import ROBOT_WORDS, WITHOUT_COLUMN, diagnose_robot
 
-    left_out = frozenset(leave_out)
-    for word in sorted(left_out.difference(ROBOT_WORDS)):
-        raise SetupError(f"no effect {word!r} of a robot to leave out; {nearest(word, ROBOT_WORDS, 'effects')}")
+    left_out, known = frozenset(leave_out), (*ROBOT_WORDS, *WITHOUT_COLUMN)
+    for word in sorted(left_out.difference(known)):
+        raise SetupError(f"no effect {word!r} of a robot to leave out; {nearest(word, known, 'effects')}")
     if len(logs) != 1:
         raise SetupError(f"{len(logs)} logs beside robot {robot.name!r}; a robot is diagnosed on one log at a time")
     (given,) = logs
