@@ -157,9 +157,11 @@ def _friction(torques: Torques) -> Iterator[Term]:
 
 
 def _coupled(torques: Torques) -> Iterator[Term]:
-    """Friction of the sum or difference of two neighbours' speeds: their gears run in one another (of a wrist)."""
+    """Friction of the sum or difference of two speeds in a wrist: its last motor drives through the joint before."""
+    robot = torques.robot
+    inner = {one for one in torques.joints for other in torques.joints if robot.is_behind(one, other)}
     for row, (one, other) in enumerate(pairwise(torques.joints)):
-        if not (one.kind == other.kind == "hinge" and torques.robot.is_behind(one, other)):
+        if not (one.kind == other.kind == "hinge" and robot.is_behind(one, other)) or other in inner:
             continue
         usual = min(_usual(torques, row), _usual(torques, row + 1))
         for sense, variant in ((1.0, "sum"), (-1.0, "difference")):
