@@ -61,7 +61,7 @@ def diagnose_gap(
     own_effects
         Effects of your own that take part, see docs/effects.md.
     seed
-        Of everything random; the same input and seed give the same answer.
+        Of everything random; the same input and seed give the same answer. Of a robot nothing is.
     start_s, end_s
         Only samples with ``start_s <= t < end_s``, seconds from each log's start.
     join
@@ -96,6 +96,8 @@ def diagnose_gap(
     if isinstance(model, Robot) or (isinstance(model, Path | str) and is_robot_file(Path(model))):
         if own_effects:
             raise SetupError("own_effects act in models; a robot's words are those of docs/robots.md")
+        if join != "auto":
+            raise SetupError(f"join {join!r}: commands of a robot are always held; leave it out")
         robot = model if isinstance(model, Robot) else load_robot(model, meshes=False)
         topics = Topics(state=state, command=command)
         return robot_gap(robot, _several(logs), leave_out, topics, Span(start_s=start_s, end_s=end_s), progress)

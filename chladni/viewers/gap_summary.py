@@ -98,7 +98,7 @@ def _effects(found: Diagnosis) -> Iterator[str]:
     elif len(causes) > _IN_A_SENTENCE:
         sites = list(dict.fromkeys(cause.site for cause in causes))
         yield f"{len(causes)} causes at {len(sites)} sites: {_listed(sites)}."
-        yield from _by_site(causes)
+        yield from _by_site(found)
     else:
         # Two names are as sure as the less sure one.
         least = min(causes, key=lambda cause: cause.probability)
@@ -112,8 +112,12 @@ def _effects(found: Diagnosis) -> Iterator[str]:
         yield from _reservations(cause)
 
 
-def _by_site(causes: Sequence[Cause]) -> Iterator[str]:
-    """A sentence a site."""
+def _by_site(found: Diagnosis) -> Iterator[str]:
+    """A sentence a site; one of all values that are wrong."""
+    wrong = [cause for cause in found.causes if cause.effect == PARAMETER]
+    causes = [cause for cause in found.causes if cause.effect != PARAMETER]
+    if wrong:
+        yield f"Wrong values: {_listed([_wrong_value(cause, found) for cause in wrong])}."
     for site in dict.fromkeys(cause.site for cause in causes):
         told = [
             f"{cause_phrase(cause).replace(f' at {site}', '')} ({chance(cause.probability)})"

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from chladni.gap.records.diagnosis import (
     Where,
 )
 from chladni.gap.robots.contest import Contest, Fit
-from chladni.gap.robots.forward import confirmed, machine_of
+from chladni.gap.robots.forward import Confirmed, confirmed, machine_of
 from chladni.gap.robots.remarks import remarks_on
 from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.solved import Solved
@@ -41,6 +42,8 @@ _OTHERS, _BLOCKS = 6, 16
 _GAP = 1.5
 #: Deviations beyond which a number is told.
 _SIGMAS = 2.0
+#: Times the noise from which an error is clear of it.
+_CLEAR = 2.0
 #: Of its share where it acts most: joints with less don't tell of it.
 _ACTS = 0.1
 #: What a description states and a joint may have less of: then it's a value that is wrong.
@@ -73,9 +76,16 @@ class Answer:
         return () if self.denied is not None else self._suggested
 
     @cached_property
-    def denied(self) -> Closing | None:
-        """What simulation says of the names that torques suggest, when it's no better with them than without."""
-        found = simulated_closing(self.solved, [one.term for one in self._suggested]) if self._suggested else None
+    def _simulated(self) -> Confirmed | None:
+        """What simulation says of the names that torques suggest; None where it can't be run, or runs go astray."""
+        best = self._contest.fit([one.term for one in self._suggested])
+        found = confirmed(Solved(contest=self._contest, best=best))
+        return found if found is not None and np.all(np.isfinite([found.before, found.tuned, found.after])) else None
+
+    @cached_property
+    def denied(self) -> Confirmed | None:
+        """The same, when it's no better with the names than without."""
+        found = self._simulated if self._suggested else None
         return found if found is not None and (found.after > found.tuned or found.after > 1.0) else None
 
     @cached_property
@@ -104,8 +114,9 @@ class Answer:
     @cached_property
     def closing(self) -> Closing:
         """How far the gap closes: of positions, simulated from the log's poses; of torques where runs go astray."""
-        named = [one.term for one in self.named]
-        return simulated_closing(self.solved, named) or closing_of(self.solved, named)
+        if self._simulated is not None:
+            return _of_positions(self.solved.torques, self._simulated, named=bool(self.named))
+        return _of_torques(self.solved, [one.term for one in self.named])
 
     def diagnosis(self) -> Diagnosis:
         """Give the record."""
@@ -278,73 +289,79 @@ def _ranking(weighed: Sequence[Weighed]) -> Iterator[Ranked]:
 
 def _where(solved: Solved, fit: Fit) -> Where:
     torques = solved.torques
-    residual, drive = torques.missing - solved.contest.explained(fit), torques.drive
-    power = np.mean(relative_residual(residual, drive) ** 2, axis=1)
+    rows = [row for row, _ in torques.rows]
+    residual, drive = (torques.missing - solved.contest.explained(fit))[rows], torques.drive[rows]
+    power, usual = np.mean(relative_residual(residual, drive) ** 2, axis=1), _usual(torques)[rows]
     shares = power / power.sum() if power.sum() > 0 else power
     rate = torques.rate_hz
-    names = [one.name for one in torques.joints]
-    rms = np.sqrt(np.mean(drive**2, axis=1))
-    regimes = {f"{name}.velocity": row for name, row in zip(names, torques.velocity, strict=True)}
+    names = [joint.name for _, joint in torques.rows]
+    regimes = {f"{joint.name}.velocity": torques.velocity[row] for row, joint in torques.rows}
+    units = {f"{joint.name}.velocity": "rad/s" if joint.kind == "hinge" else "m/s" for _, joint in torques.rows}
     return Where(
         channels=tuple(
             ChannelGap(name=name, gap=float(np.sqrt(np.mean(row**2)) / size), noise=float(noise / size),
                        noise_from="what encoders (and effort sensors) round and shake by")
-            for name, row, size, noise in zip(names, residual, rms, torques.noise, strict=True)
+            for name, row, size, noise in zip(names, residual, usual, torques.noise[rows], strict=True)
         ),
         bands=band_shares(residual, drive, sample_rate_hz=rate),
         sites=tuple(
             SiteShare(name=name, share=float(share))
             for share, name in sorted(zip(shares, names, strict=True), key=lambda one: -one[0])
         ),
-        regimes=tuple(replace(one, unit="rad/s") for one in regime_shares(residual, drive, regimes)),
+        regimes=tuple(replace(one, unit=units[one.variable]) for one in regime_shares(residual, drive, regimes)),
         times=time_shares(residual, drive, sample_rate_hz=rate),
     )  # fmt: skip
 
 
-def closing_of(solved: Solved, named: Sequence[Term]) -> Closing:
+def _of_torques(solved: Solved, named: Sequence[Term]) -> Closing:
     """How much of the missing torque the answer explains, on every other block of the log, which no fit saw."""
     torques = solved.torques
     judge = _every_other(torques.missing.shape[1])
     there = torques.moving & judge
     apart = Contest(torques, taking_part=~judge)
-    forms = {(term.word, term.site, term.variant): term for term in apart.terms}
-    chosen = [forms[term.word, term.site, term.variant] for term in named]
-    nominal, tuned, full = np.zeros_like(torques.missing), *(apart.explained(apart.fit(one)) for one in ((), chosen))
-    scale = np.sqrt(np.mean(torques.drive**2, axis=1))[:, None]
+    chosen = apart.same(named)
+    scale = _usual(torques)[:, None]
 
     def left(part: Real) -> float:
         return float(np.sqrt(np.mean((((torques.missing - part) / scale)[there]) ** 2)))
 
-    before, after, noise = left(nominal), left(full), float(np.sqrt(np.mean((torques.noise[:, None] / scale) ** 2)))
-    room, tuned_left = before - noise, left(tuned)
-    stretches = _held_out(torques, torques.log.time_s[torques.kept][judge], torques.rate_hz)
-    return Closing(
-        before=before, tuned=tuned_left, after=after, noise=noise,
-        closed=float(np.clip((before - after) / room, 0.0, 1.0)) if room > noise else None,
-        interval=None, held_out=stretches, by="torque",
-        explained=float(np.clip((tuned_left**2 - after**2) / (tuned_left**2 - noise**2), 0.0, 1.0))
-        if named and tuned_left > 2.0 * noise else None,
+    tuned, full = (left(apart.explained(apart.fit(one))) for one in ((), chosen))
+    noise = np.broadcast_to(torques.noise[:, None] / scale, there.shape)[there]
+    return _closing(
+        left(np.zeros_like(torques.missing)), tuned, full, float(np.sqrt(np.mean(noise**2))), named=bool(named),
+        by="torque", held_out=_held_out(torques, torques.log.time_s[torques.kept][judge], torques.rate_hz),
     )  # fmt: skip
 
 
-def simulated_closing(solved: Solved, named: Sequence[Term]) -> Closing | None:
-    """How far simulated positions come to the measured ones, over the motion; None where runs go astray."""
-    contest, torques = solved.contest, solved.torques
-    tuned, found = (confirmed(Solved(contest=contest, best=contest.fit(terms))) for terms in ((), tuple(named)))
-    if tuned is None or found is None or not np.all(np.isfinite([found.before, tuned.after, found.after])):
-        return None
+def _usual(torques: Torques) -> Real:
+    """``[joint]``: RMS of the drives' torques; 1 where none is known."""
+    rms = np.sqrt(np.mean(torques.drive**2, axis=1))
+    return np.asarray(np.where(torques.driven & (rms > 0), rms, 1.0))
+
+
+def _of_positions(torques: Torques, found: Confirmed, *, named: bool) -> Closing:
+    """How far simulated positions come to the measured ones, over the motion."""
     moves = np.isfinite(found.per_joint_after)
     noise = float(np.sqrt(np.mean((torques.reading_noise[moves] / found.motion[moves]) ** 2)))
-    room = found.before - noise
-    told = named and tuned.after > 2.0 * noise
     stretches = _held_out(torques, found.time_s[found.judged], torques.log.sample_rate_hz)
+    return _closing(
+        found.before, found.tuned, found.after if named else found.tuned, noise, named=named, by="windows",
+        held_out=stretches if found.held_out else (), horizon_s=found.horizon_s,
+    )  # fmt: skip
+
+
+def _closing(
+    before: float, tuned: float, after: float, noise: float, *, named: bool, by: Literal["windows", "torque"],
+    held_out: tuple[HeldOut, ...], horizon_s: float | None = None,
+) -> Closing:  # fmt: skip
+    room = before - noise
+    closed = float(np.clip((before - after) / room, 0.0, 1.0)) if room > noise else None
+    explained = None
+    if named and tuned > _CLEAR * noise:
+        explained = float(np.clip((tuned**2 - after**2) / (tuned**2 - noise**2), 0.0, 1.0))
     return Closing(
-        before=found.before, tuned=tuned.after, after=found.after, noise=noise,
-        closed=float(np.clip((found.before - found.after) / room, 0.0, 1.0)) if room > noise else None,
-        interval=None, held_out=stretches if found.held_out else (),
-        by="windows", horizon_s=found.horizon_s,
-        explained=float(np.clip((tuned.after**2 - found.after**2) / (tuned.after**2 - noise**2), 0.0, 1.0))
-        if told else None,
+        before=before, tuned=tuned, after=after, noise=noise, closed=closed, interval=None, held_out=held_out, by=by,
+        horizon_s=horizon_s, explained=explained,
     )  # fmt: skip
 
 
@@ -384,7 +401,7 @@ def _signals(solved: Solved) -> GapSignals:
     )
 
 
-def _advice(verdict: Verdict, joints: Sequence[str], denied: Closing | None) -> str | None:
+def _advice(verdict: Verdict, joints: Sequence[str], denied: Confirmed | None) -> str | None:
     if verdict != "unknown":
         return None
     if denied is not None:

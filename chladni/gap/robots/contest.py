@@ -88,6 +88,10 @@ class Fit:
         ``[joint]``: what is left at each.
     nats
         Evidence and prior.
+    within
+        How many of the numbers are of tolerances.
+    weight
+        ``[joint]``: times that energy which is left there costs as much as the noise's.
     """
 
     terms: tuple[Term, ...]
@@ -120,10 +124,10 @@ class Contest:
         blocks = [inside, *(term.columns * term.scale[:, None, None] for term in self.terms)]
         there = torques.moving if taking_part is None else torques.moving & taking_part
         weight = np.sqrt(torques.numbers_a_sample) * there / torques.noise[:, None]
-        columns = np.concatenate(blocks) * weight
+        self._blocks = np.concatenate(blocks)
+        columns = self._blocks * weight
         missing = torques.missing * weight
         self.count = torques.numbers_a_sample * np.sum(there, axis=1)
-        self._blocks = np.concatenate(blocks)
         self._gram = np.einsum("pjk,qjk->jpq", columns, columns, optimize=True)
         self._right = np.einsum("pjk,jk->jp", columns, missing)
         self._energy = np.sum(missing**2, axis=1)
@@ -169,8 +173,12 @@ class Contest:
 
     def again(self, fit: Fit) -> Fit:
         """Fit a set of another contest, of the same words at the same sites."""
+        return self.fit(self.same(fit.terms))
+
+    def same(self, terms: Sequence[Term]) -> list[Term]:
+        """Give this contest's terms of the words, sites and forms of another's."""
         forms = {(term.word, term.site, term.variant): term for term in self.terms}
-        return self.fit([forms[term.word, term.site, term.variant] for term in fit.terms])
+        return [forms[term.word, term.site, term.variant] for term in terms]
 
     def prior(self, terms: Sequence[Term]) -> float:
         """Nats of a set: each a cause of its own, or a word at several sites, as far as that is less."""

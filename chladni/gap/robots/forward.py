@@ -1,6 +1,6 @@
 """Confirmation by simulation: the description, and with what was found, run from the log's poses by its commands."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,9 +24,10 @@ class Confirmed:
 
     Attributes
     ----------
-    before, after
+    before, tuned, after
         Error of the simulated positions over the motion, both RMS on the stretches held out, pooled over joints that
-        move; infinite where a run goes astray.
+        move; infinite where a run goes astray. Of the description, of the same within its tolerances, and with what
+        was found.
     joints
         Names.
     per_joint_before, per_joint_after
@@ -46,6 +47,7 @@ class Confirmed:
     """
 
     before: float
+    tuned: float
     after: float
     joints: tuple[str, ...]
     per_joint_before: Real
@@ -234,9 +236,9 @@ def confirmed(solved: Solved) -> Confirmed | None:
         contest = Contest(torques, taking_part=~coarse)
         fit = contest.again(solved.best)
     runs = _runs(torques, blocks)
-    before = simulated(as_described(torques.robot), torques, runs)
-    after = simulated(machine_of(contest, fit), torques, runs)
-    return _told(torques, before, after, judge if held_out else np.ones_like(judge), runs, held_out=held_out)
+    machines = (as_described(torques.robot), machine_of(contest, contest.nothing), machine_of(contest, fit))
+    courses = [simulated(one, torques, runs) for one in machines]
+    return _told(torques, courses, judge if held_out else np.ones_like(judge), runs, held_out=held_out)
 
 
 def _blocks(torques: Torques) -> tuple[list[tuple[int, int]], Mask]:
@@ -300,33 +302,29 @@ def _asked(machine: Machine, torques: Torques, at_s: Real) -> Real:
     """``[joint, step]``: commands as they arrive, held; or measured efforts."""
     log = torques.log
     if torques.by_effort:
-        assert log.effort is not None  # noqa: S101
-        return np.array([np.interp(at_s, log.time_s, row) for row in log.effort])
-    assert log.command_messages is not None  # noqa: S101
+        return np.array([np.interp(at_s, log.time_s, row) for row in torques.unlimited])
     late = {one.joint.name: one.delay_s for one in machine.joints}
     found = np.zeros((len(log.joints), at_s.size))
-    for row, (name, (starts, values)) in enumerate(zip(log.joints, log.command_messages, strict=True)):
+    for row, (name, (starts, values)) in enumerate(zip(log.joints, log.command_messages or (), strict=True)):
         place = np.searchsorted(starts, at_s - late[name], side="right") - 1
         found[row] = values[np.maximum(place, 0)]
     return found
 
 
 def _told(
-    torques: Torques, before: Real, after: Real, judge: Mask, runs: list[tuple[int, int]], *, held_out: bool
+    torques: Torques, courses: Sequence[Real], judge: Mask, runs: list[tuple[int, int]], *, held_out: bool
 ) -> Confirmed:
     measured = torques.log.position
-    there = judge & ~np.isnan(before).any(axis=0) & ~np.isnan(after).any(axis=0)
+    there = judge & ~np.isnan(courses).any(axis=(0, 1))
     about = measured[:, there] - np.mean(measured[:, there], axis=1, keepdims=True)
     motion = np.sqrt(np.mean(about**2, axis=1))
     moves = motion > torques.resolution
     size = np.where(moves, motion, np.nan)
-    per_joint = [
-        np.sqrt(np.mean((one[:, there] - measured[:, there]) ** 2, axis=1)) / size for one in (before, after)
-    ]
+    per_joint = [np.sqrt(np.mean((one[:, there] - measured[:, there]) ** 2, axis=1)) / size for one in courses]
     whole = [float(np.sqrt(np.mean(one[moves] ** 2))) if moves.any() else float("nan") for one in per_joint]
     return Confirmed(
-        before=whole[0], after=whole[1], joints=torques.log.joints,
-        per_joint_before=per_joint[0], per_joint_after=per_joint[1], motion=motion,
-        time_s=torques.log.time_s, measured=measured, simulated_before=before, simulated_after=after,
+        before=whole[0], tuned=whole[1], after=whole[2], joints=torques.log.joints,
+        per_joint_before=per_joint[0], per_joint_after=per_joint[2], motion=motion,
+        time_s=torques.log.time_s, measured=measured, simulated_before=courses[0], simulated_after=courses[2],
         judged=there, horizon_s=max(b - a for a, b in runs) / torques.log.sample_rate_hz, held_out=held_out,
     )  # fmt: skip

@@ -28,7 +28,7 @@ _FAST = 4.0
 #: Periods of the cutoff that both ends of a stretch lose to the filter.
 _ENDS = 3.0
 #: Least periods of the cutoff in a stretch.
-_LEAST = 8.0
+_LEAST = 12.0
 #: Of the usual torque: what a rigid description is right to, unless a fit leaves less.
 _RIGHT = 0.02
 #: Of its usual speed: within this a joint could move either way, however fine its encoder.
@@ -117,8 +117,7 @@ class Torques:
         Of kp q' + kd q'', which is what the command's motion asks less the rate of what is needed. Only up to where
         that stands above the noise of q, which is in the missing torque, too.
         """
-        rate = np.gradient(self.wanted, 1.0 / self.rate_hz, axis=1)
-        found = self.late(self.late_s.get(ALL_COMMANDS, 0.0), 0.0) - rate
+        found = self.late(self.late_s.get(ALL_COMMANDS, 0.0), 0.0)
         frequency_hz = np.linspace(0.0, self.cutoff_hz, _LINES)[1:]
         omega = 2.0 * np.pi * frequency_hz
         for row, own in enumerate(found):
@@ -127,8 +126,16 @@ class Torques:
             clear = np.searchsorted(noise, (_CLEAR * np.std(own)) ** 2)
             cutoff_hz = frequency_hz[min(clear, len(frequency_hz) - 1)]
             sections = butter(_ORDER, cutoff_hz, fs=self.rate_hz, output="sos")
-            found[row] = sosfiltfilt(sections, own)
+            for a, b in self._coarse:
+                rate = np.gradient(self.wanted[row, a:b], 1.0 / self.rate_hz)
+                found[row, a:b] = sosfiltfilt(sections, own[a:b] - rate)
         return found
+
+    @cached_property
+    def _coarse(self) -> list[tuple[int, int]]:
+        """Bounds of the stretches on the coarse grid."""
+        first = np.searchsorted(self.kept, [a for a, _ in self.stretches])
+        return list(pairwise([*first.tolist(), self.kept.size]))
 
     def _filtered(self, values: Real, cutoff_hz: float) -> Real:
         found = np.array(values, dtype=np.float64)
@@ -158,7 +165,8 @@ class Torques:
     def _motion(self) -> tuple[Real, Real, Real]:
         position = self._filtered(self.log.position, self.cutoff_hz)
         velocity = self._rate(position)
-        return tuple(one[:, self.kept] for one in (position, velocity, self._rate(velocity)))  # type: ignore[return-value]
+        acceleration = self._rate(velocity)
+        return position[:, self.kept], velocity[:, self.kept], acceleration[:, self.kept]
 
     @property
     def position(self) -> Real:
@@ -218,7 +226,7 @@ class Torques:
         return self.of_joints(np.array(columns))
 
     def command(self, later_s: float = 0.0) -> Real:
-        """``[joint, sample]`` of the log's grid: the command as it arrives, and later still."""
+        """``[joint, sample]`` of the log's grid: the command as it arrives, and later still; NaN without any."""
         log = self.log
         if log.command is None or log.command_messages is None:
             raise LogError(f"{log.log}: holds no command; record the commands of the drives, or their efforts")
@@ -271,8 +279,7 @@ class Torques:
     @cached_property
     def unlimited(self) -> Real:
         """``[joint, sample]``: torque of the drives, before their limits."""
-        if self.by_effort:
-            assert self.log.effort is not None  # noqa: S101
+        if self.by_effort and self.log.effort is not None:
             return self.log.effort
         kp, kd = self.by_row("kp")[:, None], self.kd[:, None]
         if self.log.command_kind == "effort":
@@ -347,11 +354,11 @@ class Torques:
         """``[joint]``: standard deviation that the noise of sensors gives the missing torque."""
         inertia = self.need.inertia[[one.dof for one in self.joints]]
         damping = np.array([one.damping for one in self.joints])
-        kp, kd = (one * (not self.by_effort) for one in (self.kp, self.kd))
+        by_position = not self.by_effort and self.log.command_kind == "position"
+        kp, kd = (one * by_position for one in (self.kp, self.kd))
         found = torque_noise(self._steps[1], self.cutoff_hz, stiffness=kp, damping=kd + damping, inertia=inertia)
         if self.by_effort:
-            assert self.log.effort is not None  # noqa: S101
-            found += steps_and_noise(self.log.effort, self.log.sample_rate_hz, self.stretches)[1] * self.cutoff_hz
+            found += steps_and_noise(self.fast_drive, self.log.sample_rate_hz, self.stretches)[1] * self.cutoff_hz
         return np.sqrt(found)
 
     @cached_property
@@ -393,7 +400,9 @@ class Torques:
         """``[joint, coarse]``: missing torque a second, of commands that come so much later than some delay."""
         step = 1.0 / self.log.sample_rate_hz
         first, last = (from_s, from_s + by_s) if abs(by_s) > step else (from_s - 0.5 * step, from_s + 0.5 * step)
-        return self.kp[:, None] * self.smooth(self.command(first) - self.command(last)) / (last - first)
+        # Where nobody commands a joint nothing comes late.
+        earlier = np.nan_to_num(self.command(first) - self.command(last))
+        return self.kp[:, None] * self.smooth(earlier) / (last - first)
 
 
 def _integral(at: Real, starts: Real, values: Real, sums: Real) -> Real:

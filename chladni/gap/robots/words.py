@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -124,19 +125,23 @@ def _units(joint: RobotJoint) -> tuple[str, str, str]:
     return ("N m", "N m s/rad", "N m/rad") if joint.kind == "hinge" else ("N", "N s/m", "N/m")
 
 
+def _law(
+    torques: Torques, row: int, word: str, columns: tuple[Real, ...], *numbers: Number, variant: str | None = None
+) -> Term:
+    """A law of one joint."""
+    return Term(
+        word=word, site=torques.joints[row].name, columns=_at(torques, row, *columns), numbers=numbers, rows=(row,),
+        variant=variant,
+    )  # fmt: skip
+
+
 def _friction(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.rows:
         usual, speed = _usual(torques, row), _rms(torques.velocity[row])
         force, damping, _ = _units(joint)
         sign, fast = torques.sign[row], torques.fast_velocity[row]
         dry = Number(name="force", unit=force, scale=usual, least=-joint.friction, nominal=joint.friction)
-
-        def law(word: str, columns: tuple[Real, ...], *numbers: Number, variant: str | None = None) -> Term:
-            return Term(
-                word=word, site=joint.name, columns=_at(torques, row, *columns), numbers=numbers, rows=(row,),  # noqa: B023  # used at once
-                variant=variant,
-            )  # fmt: skip
-
+        law = partial(_law, torques, row)
         yield law("coulomb_friction", (sign,), dry)
         wet = Number(
             name="coefficient", unit=damping, scale=usual / speed, least=-joint.damping, nominal=joint.damping

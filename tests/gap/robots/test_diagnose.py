@@ -86,13 +86,16 @@ def test_a_word_that_is_left_out_is_not_replaced_by_a_sure_wrong_one(tmp_path: P
 def test_efforts_that_were_measured_need_no_gains(tmp_path: Path) -> None:
     command = commands(SECONDS)
     position = run_native(arm(tmp_path, "machine/arm.xml", shoulder=' frictionloss="2"'), command)
-    velocity = np.gradient(position, 1.0 / RATE_HZ, axis=1)
-    # What the drives gave about a sample: half of the time for the command before it.
-    asked = 0.5 * (command + np.concatenate([command[:, :1], command[:, :-1]], axis=1))
-    effort = np.array([[120.0], [60.0]]) * (asked - position) - np.array([[8.0], [3.0]]) * velocity
     robot = without_servos(arm(tmp_path))
-    found = diagnose_robot(robot, joint_log_of(robot, position, effort=effort))
+    found = diagnose_robot(robot, joint_log_of(robot, position, effort=efforts(command, position)))
     assert named(found) == {("coulomb_friction", "shoulder")}
+
+
+def efforts(command: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """What the drives gave about a sample: half of the time for the command before it."""
+    velocity = np.gradient(position, 1.0 / RATE_HZ, axis=1)
+    asked = 0.5 * (command + np.concatenate([command[:, :1], command[:, :-1]], axis=1))
+    return np.array([[120.0], [60.0]]) * (asked - position) - np.array([[8.0], [3.0]]) * velocity
 
 
 def without_servos(robot: Robot) -> Robot:
@@ -112,6 +115,52 @@ def test_what_can_not_be_told_is_refused_with_what_to_do(tmp_path: Path) -> None
         diagnose_robot(robot, joint_log_of(robot, position[:, :100], command=command[:, :100]))
     with pytest.raises(ModelError, match="its base floats"):
         diagnose_robot(replace(robot, base="floating"), joint_log_of(robot, position, command=command))
+
+
+@pytest.mark.parametrize("unknown", ["servo", "command", "effort"])
+def test_a_joint_whose_drive_is_not_known_takes_nothing_from_the_others(tmp_path: Path, unknown: str) -> None:
+    command = commands(SECONDS)
+    position = run_native(arm(tmp_path, "machine/arm.xml", shoulder=' frictionloss="2"'), command)
+    robot = arm(tmp_path)
+    log = joint_log_of(robot, position, command=command)
+    if unknown == "servo":
+        robot = replace(robot, joints=(robot.joints[0], replace(robot.joints[1], servo=None)))
+    elif unknown == "command":
+        messages = (log.command_messages or ())[:1]
+        none = (np.zeros(0), np.zeros(0))
+        log = replace(log, command=np.stack([command[0], np.full_like(command[0], np.nan)]),
+                      command_messages=(*messages, none))  # fmt: skip
+    else:
+        log = joint_log_of(robot, position, effort=efforts(command, position))
+        effort = np.array(log.effort)
+        effort[1] = np.nan
+        log = replace(log, effort=effort)
+    found = diagnose_robot(robot, log)
+    assert named(found) == {("coulomb_friction", "shoulder")}
+    assert [one.name for one in found.where.channels] == ["shoulder"]
+    assert any("elbow: no torque is known there" in remark for remark in found.remarks)
+
+
+def test_a_gap_is_not_bridged(tmp_path: Path) -> None:
+    command = commands(SECONDS)
+    position = run_native(arm(tmp_path, "machine/arm.xml", shoulder=' frictionloss="2"'), command)
+    robot = arm(tmp_path)
+    whole = joint_log_of(robot, position, command=command)
+    kept = np.r_[0:1200, 1500:3000]
+    log = replace(
+        whole, position=position[:, kept], command=command[:, kept], time_s=whole.time_s[kept], breaks=(1200,)
+    )
+    found = diagnose_robot(robot, log)
+    assert named(found) == {("coulomb_friction", "shoulder")}
+    assert found.causes[0].parameters["force"].value == pytest.approx(2.0, rel=0.1)
+
+
+def test_any_log_that_is_long_enough_is_diagnosed(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(3.0)
+    position = run_native(robot, command)
+    for samples in (int(1.5 * RATE_HZ), int(1.5 * RATE_HZ) + 1, int(1.7 * RATE_HZ)):
+        log = joint_log_of(robot, position[:, :samples], command=command[:, :samples])
+        assert not diagnose_robot(robot, log).causes
 
 
 def test_words_that_can_be_left_out_are_those_that_take_part(tmp_path: Path) -> None:
@@ -139,3 +188,7 @@ def test_the_facade_takes_a_robot_and_its_bag(tmp_path: Path) -> None:
         chladni.diagnose_gap(robot.description, [bag, bag])
     with pytest.raises(SetupError, match="no effect 'coulomb' of a robot"):
         chladni.diagnose_gap(robot.description, bag, leave_out=["coulomb"])
+    with pytest.raises(SetupError, match="commands of a robot are always held"):
+        chladni.diagnose_gap(robot.description, bag, join="hold")
+    # A word that has no column yet is one all the same.
+    assert named(chladni.diagnose_gap(robot.description, bag, leave_out=["backlash"])) == named(found)
