@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 LEAST_SHARE = 0.05
 # Rows of a table of sites or regimes, as many as one reads.
 MOST_ROWS = 6
+SITES = "What an unknown force, error or change at one site can explain"
 IN_REPORT = "the report and the JSON document"
 # The report of a comparison is asked for less often.
 IN_DOCUMENT = "the JSON document (--json FILE)"
@@ -44,6 +45,7 @@ def print_diagnosis(out: Output, found: "Diagnosis") -> None:
         tables.where_told(found),
         "Error before anything is tuned, whole log",
         of="" if found.left is None else ", of what the best parameters leave",
+        sites=tables.site_title(found, SITES),
     )
     _print(
         out, f"{tables.distortion_title(found.distortion)}, as shares of each output", tables.distortion_table(found)
@@ -100,7 +102,9 @@ def _print_use(out: Output, used: "Sequence[LogUse]") -> None:
         out.lines(one.losses)
 
 
-def _print_where(out: Output, where: "Where", error: str, *, of: str = "", all_in: str = IN_REPORT) -> None:
+def _print_where(
+    out: Output, where: "Where", error: str, *, of: str = "", all_in: str = IN_REPORT, sites: str = SITES
+) -> None:
     from chladni.viewers import gap_tables as tables
 
     _print(
@@ -112,7 +116,7 @@ def _print_where(out: Output, where: "Where", error: str, *, of: str = "", all_i
     )
     for title, table in (
         (f"Where in frequency{of}", tables.band_table(where, least=LEAST_SHARE)),
-        ("What an unknown force, error or change at one site can explain", tables.site_table(where)),
+        (sites, tables.site_table(where)),
         (f"While{of}", tables.regime_table(where, least=LEAST_SHARE)),
         (f"When{of}", tables.time_table(where, least=LEAST_SHARE)),
     ):

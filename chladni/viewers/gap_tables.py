@@ -66,6 +66,11 @@ def band_table(where: Where, *, least: float = 0.0) -> Table:
     return ("Band [Hz]", "Share", "of it noise"), rows
 
 
+def site_title(found: Diagnosis, model: str = "What one site alone can explain") -> str:
+    """Title of what sites are worth: of a robot the joints' own shares."""
+    return model if found.machine is None else "Of the torque that is missing, by joint"
+
+
 def site_table(where: Where, *, count: int | None = None) -> Table:
     """Share of the gap that an unknown force at each site explains; the largest first, at most `count`."""
     rows = [(", ".join(names), percent(share)) for names, share in places_of(where)[:count]]

@@ -9,7 +9,7 @@ from chladni.gap.records.diagnosis import BandShare, Diagnosis
 from chladni.viewers.engineering import percent, span
 from chladni.viewers.figures.sheet import WIDTH_IN, look, paint, plain
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, GapEvidence
-from chladni.viewers.gap_tables import places_of, where_told
+from chladni.viewers.gap_tables import places_of, site_title, where_told
 
 Bar = tuple[str, float]
 
@@ -67,7 +67,7 @@ def _parts(found: Diagnosis) -> list[tuple[str, Sequence[Bar]]]:
     bands = [(f"{one.low_hz:.4g} to {one.high_hz:.4g} Hz", one.share) for one in sorted(where.bands, key=_low_hz)]
     regimes = sorted(where.regimes, key=lambda one: -one.share)
     return [
-        ("What one site alone can explain", site_bars(found, count=None)),
+        (site_title(found), site_bars(found, count=None)),
         ("In which band it lies", bands),
         (
             "While which variable is where",

@@ -35,7 +35,7 @@ def _page(found: Diagnosis) -> Iterator[str]:
     if (naive := naive_sentence(found)) is not None:
         yield f"\n{escaped(naive)}"
     yield from _table("Where it lies", tables.channel_table(found.where))
-    yield from _table("What one site alone can explain", tables.site_table(found.where, count=SITES))
+    yield from _table(tables.site_title(found), tables.site_table(found.where, count=SITES))
     yield from _table("Parameters that moved, or that this log doesn't determine", tables.parameter_table(found))
     remarks = (*found.levels, *found.remarks)
     if remarks:
