@@ -13,6 +13,7 @@ from chladni.io.channel_source import ChannelSource
 from chladni.io.loss import Unread
 from chladni.io.mcap.container import McapContainer
 from chladni.io.message_path import MessagePath, near_matches, parse_message_path
+from chladni.io.number_lists import NumberLists
 from chladni.io.publishers import at_once, evenly_in_turn
 from chladni.io.setup import ChannelSetup, Setup, refined
 from chladni.io.stamps import (
@@ -26,7 +27,7 @@ from chladni.io.stamps import (
 )
 from chladni.io.stream import Stream
 from chladni.io.topic import Topic, apart, read_arrivals, read_earlier_heads, read_heads, topics_of
-from chladni.io.topic_channels import NumberLists, TopicChannels, topic_channels
+from chladni.io.topic_channels import TopicChannels, topic_channels
 from chladni.signals.errors import LogError, SetupError
 
 #: Channels that a log may list; MCAP numbers its own with 16 bits.

@@ -19,7 +19,7 @@ from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import TimeSeries
 
 if TYPE_CHECKING:
-    from chladni.io.topic_channels import NumberLists
+    from chladni.io.number_lists import NumberLists
     from chladni.signals.frequency_response import FrequencyResponse
     from chladni.signals.mode_set import ModeSet
     from chladni.signals.resampling import JoinMethod

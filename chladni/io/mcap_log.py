@@ -20,10 +20,10 @@ from chladni.io.log_survey import survey
 from chladni.io.loss import Loss, Unread, losses
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.limits import Limits
+from chladni.io.number_lists import NumberLists
 from chladni.io.setup import Setup
 from chladni.io.stamps import StampRequest
 from chladni.io.stream import Stream, read_pieces
-from chladni.io.topic_channels import NumberLists
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.geometry import Geometry

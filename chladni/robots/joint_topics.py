@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from chladni.io.log import Log
-    from chladni.io.topic_channels import NumberLists
+    from chladni.io.number_lists import NumberLists
     from chladni.robots.robot import CommandKind, Robot
     from chladni.signals.arrays import Real
 

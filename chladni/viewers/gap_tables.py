@@ -71,6 +71,11 @@ def site_title(found: Diagnosis, model: str = "What one site alone can explain")
     return model if found.machine is None else "Of the torque that is missing, by joint"
 
 
+def sites_named(found: Diagnosis) -> set[str]:
+    """Sites of the causes; both of a pair."""
+    return {site for cause in found.causes for site in (cause.site, *cause.site.split("~"))}
+
+
 def site_table(where: Where, *, count: int | None = None) -> Table:
     """Share of the gap that an unknown force at each site explains; the largest first, at most `count`."""
     rows = [(", ".join(names), percent(share)) for names, share in places_of(where)[:count]]

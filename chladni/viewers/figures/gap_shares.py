@@ -9,7 +9,7 @@ from chladni.gap.records.diagnosis import BandShare, Diagnosis
 from chladni.viewers.engineering import percent, span
 from chladni.viewers.figures.sheet import WIDTH_IN, look, paint, plain
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, GapEvidence
-from chladni.viewers.gap_tables import places_of, site_title, where_told
+from chladni.viewers.gap_tables import places_of, site_title, sites_named, where_told
 
 Bar = tuple[str, float]
 
@@ -24,7 +24,7 @@ def share_figures(evidence: GapEvidence) -> dict[str, Figure]:
     parts = [(title, bars) for title, bars in _parts(evidence.found) if bars]
     if not parts:
         return {}
-    named = {cause.site for cause in evidence.found.causes}
+    named = sites_named(evidence.found)
     with look():
         heights = [0.3 + BAR_HEIGHT_IN * len(bars) for _, bars in parts]
         figure = Figure(figsize=(WIDTH_IN, sum(heights) + 0.3), layout="constrained")

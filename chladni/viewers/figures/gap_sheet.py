@@ -20,7 +20,7 @@ from chladni.viewers.figures.restoring_force import draw_surfaces
 from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.gap_summary import caveats, summary
-from chladni.viewers.gap_tables import site_title
+from chladni.viewers.gap_tables import site_title, sites_named
 
 # Of the summary, beside its caveats; the rest is in the report.
 SENTENCES, LETTERS = 2, 90
@@ -138,6 +138,10 @@ def _force(figure: Figure, place: SubplotSpec, surface: RestoringForce) -> None:
 
 def _sites(figure: Figure, place: SubplotSpec, found: Diagnosis) -> None:
     axes = figure.add_subplot(place)
-    draw_shares(axes, site_bars(found), named={cause.site for cause in found.causes})
+    draw_shares(
+        axes,
+        site_bars(found),
+        named=sites_named(found),
+    )
     axes.set_title(site_title(found), loc="left", pad=2)
     axes.set_xlabel(share_label(found))

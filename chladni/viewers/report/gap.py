@@ -166,11 +166,15 @@ def _captions(found: Diagnosis) -> Mapping[str, str]:
     each = f" Simulated over {windows}, each from an estimated state." if windows else ""
     named = found.verdict in ("effect", "parameters")
     after = "after with what was found" if named else "with the best parameters"
-    sites = {cause.site for cause in found.causes}
+    sites = tables.sites_named(found)
     drawn = any(one.law_force is not None for one in found.restoring_forces)
     coloured = any(one.name in sites for one in found.where.sites)
     return {
-        "signals": f"Where the model errs most: measured, simulated before, and {after}.{each}",
+        "signals": (
+            f"Where the model errs most: measured, simulated before, and {after}.{each}"
+            if found.machine is None
+            else f"Torques of the drives, and what the motion needs: as described, and {after}."
+        ),
         "errors": f"What is left of the whole log, before and {after}.",
         "spectra": "Spectra of the errors and of what was measured." + (" Mean over the windows." if windows else ""),
         "map": f"Density of the gap over band and time, before and {after}; outputs over their RMS.",

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, SetupError
@@ -90,6 +91,15 @@ def test_joints_by_name(tmp_path: Path) -> None:
     assert list(message.name) == ["elbow", "wrist"]
     assert (message.position[0], message.velocity[1]) == (series.values[0, 1], series.values[1, 1])
     assert list(message.effort) == []
+
+
+def test_channels_under_the_names_of_joints_are_listed_so_with_their_units(tmp_path: Path) -> None:
+    names = ["/arm.position[elbow]", "/arm.position[wrist]"]
+    channels = tuple(Channel(name=name, unit="rad") for name in names)
+    write_mcap(TimeSeries(values=noise(2, 40), sample_rate_hz=100.0, channels=channels), tmp_path / "a.mcap")
+    with open_log(tmp_path / "a.mcap") as log:
+        assert [(one.name, one.unit) for one in log.channels] == [(name, "rad") for name in names]
+        assert log.read(names).samples == 40
 
 
 @pytest.mark.parametrize(("dtype", "schema"), [(np.float32, "SampleBlock"), (np.float64, "SampleBlock64")])
