@@ -50,13 +50,21 @@ def needed_torque(robot: Robot, position: Real, velocity: Real, acceleration: Re
     return Needed(torque=torque, regressor=_regressor(links), inertia=inertia_diagonal(robot.model, position))
 
 
+def motion_torque(robot: Robot, position: Real, velocity: Real, acceleration: Real) -> Real:
+    """Give ``[dof, sample]``: the torque of `needed_torque`, without what links add to it."""
+    from chladni.robots.mujoco_motion import torque_alone
+
+    return torque_alone(robot.model, position, velocity, acceleration)
+
+
 def gravity_columns(robot: Robot, position: Real) -> Real:
     """Give ``[2, dof, sample]``: torque a radian that the base is turned by, about its x and y axes."""
-    from chladni.robots.mujoco_motion import static_torque, tilted
+    from chladni.robots.mujoco_motion import tilted, torque_alone
 
-    step = 1e-3
-    level = static_torque(robot.model, position)
-    return np.stack([(static_torque(tilted(robot.model, axis, step), position) - level) / step for axis in (0, 1)])
+    step, still = 1e-3, np.zeros_like(position)
+    level = torque_alone(robot.model, position, still, still)
+    turned = [torque_alone(tilted(robot.model, axis, step), position, still, still) for axis in (0, 1)]
+    return (np.stack(turned) - level) / step
 
 
 def inertial_numbers(robot: Robot) -> Real:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -16,6 +16,63 @@ if TYPE_CHECKING:
 _ROUNDING: Final = 1e-9
 #: Of its lowest described eigenvalue: what is left of it.
 _LEAST: Final = 0.01
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loop:
+    """Friction that builds up over a way to its level: ``dF = force / yields (1 - F / force sgn s) dq`` (Dahl 1968).
+
+    Attributes
+    ----------
+    force, yields
+        N m (N); rad (m).
+    """
+
+    force: float
+    yields: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ripple:
+    """Torque that resists by ``sine sin(2 pi q / period) + cosine cos(2 pi q / period)``; N m (N), rad (m)."""
+
+    sine: float
+    cosine: float
+    period: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """Spring beyond a place: above it where `side` is 1, below where it's -1.
+
+    Attributes
+    ----------
+    stiffness, clearance
+        N m/rad (N/m); the place times `side`, rad (m).
+    """
+
+    stiffness: float
+    clearance: float
+    side: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transmission:
+    """Spring and play between a motor and its link; the drive's loop works on the motor's angle.
+
+    Attributes
+    ----------
+    stiffness, gap, inertia
+        N m/rad (N/m), infinite for teeth that don't give; whole play, rad (m); of the motor beyond the description's,
+        at the joint, kg m^2 (kg).
+    logs_motor
+        Whether the log reads the motor's angle, not the link's.
+    """
+
+    stiffness: float
+    gap: float
+    inertia: float
+    logs_motor: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +99,10 @@ class MachineJoint:
         Time constant of the torque.
     delay_s
         By which commands arrive late.
+    dead, rate
+        Torque below which the drive gives none, N m (N), and speed that its reference doesn't exceed, rad/s (m/s).
+    loop, ripple, stops, transmission
+        Further laws; None and empty without.
     reading, drive_reading
         What the log reads, and what the drive reads beyond the log, minus the truth; rad (m).
     """
@@ -60,8 +121,25 @@ class MachineJoint:
     gain: float = 1.0
     lag_s: float = 0.0
     delay_s: float = 0.0
+    dead: float = 0.0
+    rate: float = np.inf
+    loop: Loop | None = None
+    ripple: Ripple | None = None
+    stops: tuple[Stop, ...] = ()
+    transmission: Transmission | None = None
     reading: float = 0.0
     drive_reading: float = 0.0
+
+    def with_share(self, share: float) -> MachineJoint:
+        """Give the same with laws that were found in units of torque that was asked, where a share of it arrives."""
+        loop, ripple = self.loop, self.ripple
+        return replace(
+            self, rise=share * self.rise, quadratic=share * self.quadratic, load=share * self.load,
+            stiffness=share * self.stiffness, torque=share * self.torque,
+            loop=None if loop is None else replace(loop, force=share * loop.force),
+            ripple=None if ripple is None else replace(ripple, sine=share * ripple.sine, cosine=share * ripple.cosine),
+            stops=tuple(replace(one, stiffness=share * one.stiffness) for one in self.stops),
+        )  # fmt: skip
 
     def gains(self) -> tuple[float, float, float]:
         """Give kp, kd and limit as they act at the joint; zeros and an infinite limit where nothing says."""

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from chladni.robots.dynamics import inertial_numbers
+from chladni.robots.joint_laws import Between, followed, further_laws, tooth_of
 from chladni.robots.loading import made_of
 from chladni.robots.machine import about_centre
 from chladni.robots.mujoco_motion import gravity_of, inertia_diagonal
@@ -70,9 +71,12 @@ def longest_step_s(machine: Machine, names: Sequence[str]) -> float:
     inertia = inertia_diagonal(model, np.asarray(model.qpos0, dtype=np.float64)[:, None])
     found = _LONGEST_S
     for one in _chosen(machine, names):
-        stiffness = one.gains()[0] + one.stiffness
+        stiffness = one.gains()[0] + one.stiffness + sum(each.stiffness for each in one.stops)
+        own = float(inertia[one.joint.dof])
+        if one.transmission is not None:
+            stiffness, own = max(stiffness, tooth_of(one.transmission, own)), min(own, one.transmission.inertia)
         if stiffness > 0:
-            found = min(found, _PHASE * float(np.sqrt(inertia[one.joint.dof] / stiffness)))
+            found = min(found, _PHASE * float(np.sqrt(own / stiffness)))
     return max(found, _SHORTEST_S)
 
 
@@ -180,8 +184,9 @@ class _Run:
         self._data = mujoco.MjData(self._model)
         self._places = _slice([one.joint.position for one in self._joints])
         self._dofs = _slice([one.joint.dof for one in self._joints])
+        self._between = Between.of(self._joints, self._inertia(), driven.step_s)
         self._set_drives()
-        self._laws = [*self._friction_laws(), *self._pulls()]
+        self._laws = [*self._friction_laws(), *self._pulls(), *further_laws(self._joints, self._data, self._dofs)]
 
     def _row(self, name: str) -> Real:
         return np.array([getattr(one, name) for one in self._joints], dtype=np.float64)
@@ -196,18 +201,21 @@ class _Run:
         self._kp, self._kd = kp * positions, kd * (positions | velocities)
         self._limit, self._lag_s = limit, self._row("lag_s")
         # Damping is stiff, so it goes into the integrator; what a limit or a lag takes from it is given back.
-        self._implicit = np.where(self._lag_s > 0, 0.0, self._kd)
+        self._implicit = np.where((self._lag_s > 0) | self._between.soft, 0.0, self._kd)
         _damping(self._model)[self._dofs] += self._implicit
 
     def _filtered(self, asked: Real) -> Real:
         """Follow commands as drives do that filter them, from rest at the first command of a run."""
         found = asked.copy()
         for row, one in enumerate(self._joints):
+            if np.isfinite(one.rate) and self._driven.kind[row] == "position":
+                for run in self._spans():
+                    found[row, run] = followed(asked[row, run], one.rate * self._driven.step_s)
             if one.servo is not None and one.servo.lag_s > 0:
                 share = -np.expm1(-self._driven.step_s / one.servo.lag_s)
                 for run in self._spans():
-                    start = [(1.0 - share) * asked[row, run.start]]
-                    found[row, run] = lfilter([share], [1.0, share - 1.0], asked[row, run], zi=start)[0]
+                    start = [(1.0 - share) * found[row, run.start]]
+                    found[row, run] = lfilter([share], [1.0, share - 1.0], found[row, run], zi=start)[0]
         return found
 
     def _spans(self) -> list[slice]:
@@ -250,29 +258,40 @@ class _Run:
         """Run all."""
         driven, found = self._driven, []
         for place, span in enumerate(self._spans()):
-            self._start(driven.position[:, place], driven.velocity[:, place])
+            self._start(driven.position[:, place], driven.velocity[:, place], self._forward[:, span.start])
             path = self._path(span)[:: driven.every]
             path[np.logical_or.accumulate(~np.isfinite(path).all(axis=1))] = np.inf
             found.append(path)
         return np.concatenate(found).T + self._row("reading")[:, None]
 
-    def _start(self, position: Real, velocity: Real) -> None:
+    def _inertia(self) -> Real:
+        diagonal = inertia_diagonal(self._model, np.asarray(self._model.qpos0, dtype=np.float64)[:, None])
+        return diagonal[[one.joint.dof for one in self._joints]]
+
+    def _start(self, position: Real, velocity: Real, ahead: Real) -> None:
         self._mujoco.mj_resetData(self._model, self._data)
-        self._data.qpos[self._places] = position - self._row("reading")
+        truth = position - self._row("reading")
+        self._data.qpos[self._places] = self._between.start(truth, velocity, ahead, self._kp)
         self._data.qvel[self._dofs] = velocity
 
     def _path(self, span: slice) -> Real:
         """Step through a run; ``[step, joint]``, NaN from where it goes astray."""
         data, model, step = self._data, self._model, self._mujoco.mj_step
         qpos, qvel, applied = data.qpos, data.qvel, data.qfrc_applied
-        places, dofs, kp, laws = self._places, self._dofs, self._kp, self._laws
+        places, dofs, kp, laws, between = self._places, self._dofs, self._kp, self._laws, self._between
         ahead = np.ascontiguousarray(self._forward[:, span].T)
         path = np.full_like(ahead, np.nan)
         bound = self._bound()
         for place in range(len(ahead)):
             position, velocity = qpos[places], qvel[dofs]
-            path[place] = position
-            applied[dofs] = bound(ahead[place] - kp * position, velocity)
+            if between.any:
+                path[place] = between.logged(position)
+                turned, turning = between.motor(position, velocity)
+                torque = bound(ahead[place] - kp * turned, turning)
+                applied[dofs] = between.passed(torque, position, velocity)
+            else:
+                path[place] = position
+                applied[dofs] = bound(ahead[place] - kp * position, velocity)
             for law in laws:
                 law(position, velocity)
             step(model, data)
@@ -284,15 +303,22 @@ class _Run:
     def _bound(self) -> Callable[[Real, Real], Real]:
         """Give what limits and lags make of a torque whose damping is implicit."""
         limit, kd, implicit, lag_s = self._limit, self._kd, self._implicit, self._lag_s
-        limited, lagging = bool(np.isfinite(limit).any()), bool((lag_s > 0).any())
+        dead = self._row("dead") * self._row("gain")
+        limited, lagging = bool(np.isfinite(limit).any() or dead.any()), bool((lag_s > 0).any())
         if not limited and not lagging:
-            return lambda torque, _: torque
+            explicit = kd - implicit
+            return (
+                (lambda torque, velocity: torque - explicit * velocity)
+                if explicit.any()
+                else lambda torque, _: torque
+            )
         share = np.where(lag_s > 0, -np.expm1(-self._driven.step_s / np.maximum(lag_s, 1e-9)), 1.0)
         state: Real | None = None
 
         def bounded(torque: Real, velocity: Real) -> Real:
             nonlocal state
-            given = np.minimum(np.maximum(torque - kd * velocity, -limit), limit)
+            asked = torque - kd * velocity
+            given = np.minimum(np.maximum(asked - np.clip(asked, -dead, dead), -limit), limit)
             if lagging:
                 state = given if state is None else state + share * (given - state)
                 given = state

@@ -63,14 +63,14 @@ def inertia_diagonal(model: Any, position: Real) -> Real:
     return found / len(poses)
 
 
-def static_torque(model: Any, position: Real) -> Real:
-    """Give ``[dof, sample]``: torque that holds each pose."""
+def torque_alone(model: Any, position: Real, velocity: Real, acceleration: Real) -> Real:
+    """Give ``[dof, sample]``: the torque of `walk`."""
     import mujoco
 
     quiet, data = _quiet(model)
     torque = np.empty_like(position)
-    for sample, pose in enumerate(position.T):
-        data.qpos[:], data.qvel[:], data.qacc[:] = pose, 0.0, 0.0
+    for sample, (pose, speed, rate) in enumerate(zip(position.T, velocity.T, acceleration.T, strict=True)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = pose, speed, rate
         mujoco.mj_inverse(quiet, data)
         torque[:, sample] = data.qfrc_inverse
     return torque

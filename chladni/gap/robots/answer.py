@@ -31,8 +31,8 @@ from chladni.gap.robots.forward import Confirmed, confirmed, machine_of
 from chladni.gap.robots.remarks import remarks_on
 from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.solved import Solved
+from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import Torques
-from chladni.gap.robots.words import Term
 from chladni.robots.dynamics import inertial_numbers
 from chladni.signals.arrays import Mask, Real
 

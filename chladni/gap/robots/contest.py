@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from math import comb, log, log1p
 
@@ -9,8 +10,10 @@ import numpy as np
 
 from chladni.gap.calibration import ANOTHER, DETAILS, ELSEWHERE, USUAL
 from chladni.gap.records.diagnosis import PARAMETER
+from chladni.gap.robots.term import FOUND, Term
+from chladni.gap.robots.tolerances import tolerances
 from chladni.gap.robots.torques import Torques
-from chladni.gap.robots.words import Term, all_terms, tolerances
+from chladni.gap.robots.words import all_terms
 from chladni.signals.arrays import Index, Mask, Real
 
 #: Share by which the noise of a torque is known.
@@ -123,14 +126,11 @@ class Contest:
         self.within = len(inside)
         blocks = [inside, *(term.columns * term.scale[:, None, None] for term in self.terms)]
         there = torques.moving if taking_part is None else torques.moving & taking_part
-        weight = np.sqrt(torques.numbers_a_sample) * there / torques.noise[:, None]
         self._blocks = np.concatenate(blocks)
-        columns = self._blocks * weight
-        missing = torques.missing * weight
+        self._whiten = np.sqrt(torques.numbers_a_sample) * there / torques.noise[:, None]
         self.count = torques.numbers_a_sample * np.sum(there, axis=1)
-        self._gram = np.einsum("pjk,qjk->jpq", columns, columns, optimize=True)
-        self._right = np.einsum("pjk,jk->jp", columns, missing)
-        self._energy = np.sum(missing**2, axis=1)
+        self._gram, self._right = self._moments(self._blocks, self._blocks)
+        self._energy = np.sum((torques.missing * self._whiten) ** 2, axis=1)
         self._start = 1.0 / (1.0 + np.maximum(self._energy - self.count, 0.0) / np.maximum(self.count, 1.0))
         starts = np.cumsum([self.within, *(len(term.scale) for term in self.terms)])
         self._places = {
@@ -138,11 +138,49 @@ class Contest:
         }
         bounds = [term.least / term.scale for term in self.terms]
         self._least = np.concatenate([np.full(self.within, -np.inf), *bounds])
-        self._words = Counter(term.word for term in {term.key: term for term in self.terms}.values())
+        kinds = {term.key: term for term in self.terms}
+        self._words, self._every = Counter(term.word for term in kinds.values()), log(max(len(kinds), 1))
         # What tolerances alone leave.
         self._before = self._energy
         self.nothing = self.fit(())
         self._before = np.array([one.energy for one in self.nothing.left])
+
+    def _moments(self, some: Real, others: Real) -> tuple[Real, Real]:
+        """Give ``[joint, some, others]`` of whitened columns, and ``[joint, some]`` with what is missing."""
+        gram = np.zeros((some.shape[1], len(some), len(others)))
+        right = np.zeros(gram.shape[:2])
+        for row, whiten in enumerate(self._whiten):
+            # Most columns are laws of another joint.
+            here, there = (np.flatnonzero(np.any(one[:, row], axis=1)) for one in (some, others))
+            left = some[here, row] * whiten
+            gram[row][np.ix_(here, there)] = left @ (others[there, row] * whiten).T
+            right[row, here] = left @ (self.torques.missing[row] * whiten)
+        return gram, right
+
+    def narrowed(self, terms: Sequence[Term]) -> "Contest":
+        """Give the contest of these terms alone, at the same prices."""
+        chosen, other = self._chosen(terms), copy(self)
+        other.terms = list(terms)
+        other._blocks, other._least = self._blocks[chosen], self._least[chosen]
+        other._gram, other._right = self._gram[:, chosen[:, None], chosen], self._right[:, chosen]
+        counts = np.cumsum([self.within, *(len(term.scale) for term in terms)])
+        other._places = {id(term): np.arange(a, a + len(term.scale)) for term, a in zip(terms, counts, strict=False)}
+        return other
+
+    def joined(self, term: Term) -> "Contest":
+        """Give the contest with one term more, at the same prices."""
+        other, columns = copy(self), term.columns * term.scale[:, None, None]
+        first, count = len(self._blocks), len(columns)
+        other.terms = [*self.terms, term]
+        other._blocks = np.concatenate([self._blocks, columns])
+        gram, right = self._moments(columns, other._blocks)
+        whole = np.zeros((len(gram), first + count, first + count))
+        whole[:, :first, :first] = self._gram
+        whole[:, first:], whole[:, :, first:] = gram, np.swapaxes(gram, 1, 2)
+        other._gram, other._right = whole, np.concatenate([self._right, right], axis=1)
+        other._least = np.concatenate([self._least, term.least / term.scale])
+        other._places = {**self._places, id(term): np.arange(first, first + count)}
+        return other
 
     def fit(self, terms: Sequence[Term], near: "Fit | None" = None) -> Fit:
         """Fit a set: most probable numbers, each joint weighed by how far from its noise it is left.
@@ -177,17 +215,20 @@ class Contest:
 
     def same(self, terms: Sequence[Term]) -> list[Term]:
         """Give this contest's terms of the words, sites and forms of another's."""
-        forms = {(term.word, term.site, term.variant): term for term in self.terms}
-        return [forms[term.word, term.site, term.variant] for term in terms]
+        forms = {(term.site, *term.kind): term for term in self.terms}
+        found = [forms.get((term.site, term.word, term.variant, FOUND)) for term in terms]
+        return [forms[term.site, *term.kind] if one is None else one for one, term in zip(found, terms, strict=True)]
 
     def prior(self, terms: Sequence[Term]) -> float:
         """Nats of a set: each a cause of its own, or a word at several sites, as far as that is less."""
         nats = 0.0
-        every = log(len({term.key for term in self.terms}))
+        every = self._every
         for word, count in Counter(term.word for term in terms).items():
             alone = (log(ANOTHER) - every) * (count - 1)
             shared = log(ANOTHER) - log(comb(self._words[word], count)) if count > 1 else -np.inf
             nats += log(ANOTHER) - every + max(alone, shared)
+        # A form that was chosen among several was one of them by chance.
+        nats -= sum(log(term.form.count) for term in terms if term.form is not None)
         # Tolerances allow for what values are usually wrong by: more is one thing more.
         nats += log(ANOTHER) * sum(term.word == PARAMETER for term in terms)
         # A law that holds a simpler one, with another number, is one thing more.

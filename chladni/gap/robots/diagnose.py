@@ -14,15 +14,12 @@ StepProgress = Callable[[str, float], None]
 
 #: Words of robots beside those of effects.md.
 ROBOT_WORDS = (
-    "armature", "controller_gain", "coulomb_friction", "delay", "encoder_offset", "gain_error", "gravity_tilt",
-    "joint_spring", "lag", "load_friction", "payload", "quadratic_damping", "saturation", "stribeck_friction",
-    "viscous_friction",
+    "armature", "backlash", "controller_gain", "coulomb_friction", "dead_zone", "delay", "encoder_offset", "gain_error",
+    "gravity_tilt", "hysteresis", "joint_elasticity", "joint_spring", "lag", "load_friction", "one_sided_stop", "payload",
+    "quadratic_damping", "rate_limit", "ripple", "saturation", "stribeck_friction", "viscous_friction",
 )  # fmt: skip
 #: Words of docs/robots.md that have no column yet: what they'd name is unknown, and leaving them out changes nothing.
-WITHOUT_COLUMN = (
-    "backlash", "dead_zone", "external_force", "hysteresis", "joint_elasticity", "misalignment", "one_sided_stop",
-    "rate_limit", "ripple",
-)  # fmt: skip
+WITHOUT_COLUMN = ("external_force", "misalignment")
 
 
 @in_one_thread()

@@ -7,15 +7,29 @@ import numpy as np
 
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.solved import Solved
+from chladni.gap.robots.term import Term
+from chladni.gap.robots.tolerances import INERTIAL_NAMES, LOOP_S, tolerated_inertia
 from chladni.gap.robots.torques import ALL_COMMANDS, Torques
-from chladni.gap.robots.words import INERTIAL_NAMES, LOOP_S, Term, tolerated_inertia
+from chladni.gap.robots.transmission_words import AT_MOTOR
 from chladni.robots.dynamics import inertial_numbers
-from chladni.robots.machine import Coupling, Machine, MachineJoint, as_described, physical
+from chladni.robots.machine import (
+    Coupling,
+    Loop,
+    Machine,
+    MachineJoint,
+    Ripple,
+    Stop,
+    Transmission,
+    as_described,
+    physical,
+)
 from chladni.signals.arrays import Mask, Real
 
 #: Least length of the blocks of which every other one judges, in periods of the cutoff.
 _PERIODS = 16.0
 _ROUNDING = 1e-6
+#: Of the link's inertia: least rotor of a motor that runs ahead of it.
+_LEAST_ROTOR = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,9 +145,7 @@ class _Reading:
             friction=max(_towards(described.friction, one.friction, share), 0.0),
             damping=max(_towards(described.damping, one.damping, share), 0.0),
             armature=max(_towards(described.armature, one.armature, share), 0.0),
-            rise=share * one.rise, quadratic=share * one.quadratic, load=share * one.load,
-            stiffness=share * one.stiffness, torque=share * one.torque,
-        )  # fmt: skip
+        ).with_share(share)
         if one.servo is not None and (one.servo.kp or one.servo.kd):
             kp, kd = (one.servo.kp or 0.0) / over_kp, (one.servo.kd or 0.0) * (1.0 + kd_over_kp / over_kp)
             # What is read late by a part of the loop's period takes from the damping.
@@ -182,15 +194,44 @@ def _point(values: Real) -> Real:
 Law = Callable[[MachineJoint, Term, Real, Torques], MachineJoint]
 
 
-def _stribeck(one: MachineJoint, term: Term, values: Real, torques: Torques) -> MachineJoint:
-    row = torques.log.joints.index(one.joint.name)
-    speed = float(np.sqrt(np.mean(torques.velocity[row] ** 2)))
-    return replace(one, friction=float(values[0]), rise=float(values[1]), fading=float(str(term.variant)) * speed)
+def _stribeck(one: MachineJoint, term: Term, values: Real, _: Torques) -> MachineJoint:
+    return replace(one, friction=float(values[0]), rise=float(values[1]), fading=term.form_value)
 
 
 def _saturation(one: MachineJoint, term: Term, _values: Real, _torques: Torques) -> MachineJoint:
-    limit = float(str(term.variant).split(" ", 1)[0])
-    return one if one.servo is None else replace(one, servo=replace(one.servo, limit=limit))
+    return one if one.servo is None else replace(one, servo=replace(one.servo, limit=term.form_value))
+
+
+def _hysteresis(one: MachineJoint, term: Term, values: Real, _: Torques) -> MachineJoint:
+    return replace(one, loop=Loop(force=float(values[0]), yields=term.form_value))
+
+
+def _ripple(one: MachineJoint, term: Term, values: Real, _: Torques) -> MachineJoint:
+    return replace(one, ripple=Ripple(sine=float(values[0]), cosine=float(values[1]), period=term.form_value))
+
+
+def _stop(one: MachineJoint, term: Term, values: Real, _: Torques) -> MachineJoint:
+    side = 1.0 if term.variant == "above" else -1.0
+    stop = Stop(stiffness=float(values[0]), clearance=term.form_value, side=side)
+    return replace(one, stops=(*one.stops, stop))
+
+
+def _transmission(one: MachineJoint, term: Term, values: Real, torques: Torques) -> MachineJoint:
+    found = {number.name: float(value) for number, value in zip(term.numbers, values, strict=True)}
+    rotor = max(found["inertia"], 0.0)
+    first = "gap" if term.word == "backlash" else "compliance"
+    # Where the log has efforts its product with the rotor is told.
+    gives = found[first] if first in found else found["both"] / rotor if rotor else 0.0
+    # A motor without a rotor can't be run.
+    rotor = max(rotor, _LEAST_ROTOR * float(torques.need.inertia[one.joint.dof]))
+    stiffness = np.inf if first == "gap" or gives <= 0 else 1.0 / gives
+    return replace(
+        one,
+        transmission=Transmission(
+            stiffness=stiffness, gap=max(gives, 0.0) if first == "gap" else 0.0, inertia=rotor,
+            logs_motor=term.variant == AT_MOTOR,
+        ),
+    )  # fmt: skip
 
 
 def _offset(one: MachineJoint, term: Term, values: Real, _torques: Torques) -> MachineJoint:
@@ -209,6 +250,13 @@ _LAWS: Mapping[str, Law] = {
     "armature": lambda one, _term, values, _: replace(one, armature=float(values[0])),
     "lag": lambda one, _term, values, _: replace(one, lag_s=max(float(values[0]), 0.0)),
     "saturation": _saturation,
+    "dead_zone": lambda one, term, _values, _: replace(one, dead=term.form_value),
+    "rate_limit": lambda one, term, _values, _: replace(one, rate=term.form_value),
+    "hysteresis": _hysteresis,
+    "ripple": _ripple,
+    "one_sided_stop": _stop,
+    "joint_elasticity": _transmission,
+    "backlash": _transmission,
     "encoder_offset": _offset,
 }
 

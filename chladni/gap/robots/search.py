@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 
 from chladni.gap.robots.contest import Contest, Fit
-from chladni.gap.robots.words import Term
+from chladni.gap.robots.term import Term
 
 #: Terms that are fitted in full of those that promise most.
 _FITTED = 12
@@ -53,9 +53,9 @@ def _beside(contest: Contest, one: Fit) -> list[Fit]:
 
 def _shared(others: Sequence[Term]) -> Iterable[list[Term]]:
     """Words at all joints that lack them."""
-    kinds = dict.fromkeys((term.word, term.variant) for term in others if len(term.rows) == 1)
-    for word, variant in kinds:
-        yield [term for term in others if (term.word, term.variant) == (word, variant) and len(term.rows) == 1]
+    alone = [term for term in others if len(term.rows) == 1]
+    for kind in dict.fromkeys(term.kind for term in alone):
+        yield [term for term in alone if term.kind == kind]
 
 
 def _tidied(contest: Contest, best: Fit) -> Fit:

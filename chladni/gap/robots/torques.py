@@ -12,7 +12,7 @@ from scipy.ndimage import correlate1d
 from scipy.signal import butter, sosfiltfilt
 
 from chladni.gap.robots.joint_noise import steps_and_noise, torque_noise
-from chladni.robots.dynamics import Needed, gravity_columns, needed_torque
+from chladni.robots.dynamics import Needed, gravity_columns, motion_torque, needed_torque
 from chladni.robots.joint_log import JointLog
 from chladni.robots.robot import Robot, RobotJoint
 from chladni.signals.arrays import Index, Mask, Real
@@ -36,11 +36,17 @@ _STILL = 0.002
 _ORDER = 4
 #: Lines on which the noise is summed up, and its share of a signal that stands clear of it.
 _LINES, _CLEAR = 64, 0.02
+#: By how much a joint is turned to tell what that changes, rad (m), RMS.
+_TURN = 1e-4
 ALL_COMMANDS = "all commands"
 #: Share of rest within the filter's length up to which a sample counts as moving.
 _MIXED = 0.5
 #: Central difference of eighth order (Fornberg 1988): exact up to a third of the sample rate but for 2 %.
 _SLOPE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
+
+
+#: Word, site and variant.
+FormKey = tuple[str, str, str | None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,6 +61,10 @@ class Torques:
         Delays that were guessed, by site: what their columns are exact for.
     centre_m
         Centres of payloads that were guessed, by link: their own inertia is that of a point there.
+    forms
+        Numbers of laws that were found between those of their grids.
+    explained
+        ``[joint, coarse]``: missing torque that was explained already; nothing when None.
     level
         ``[joint]``: share of the highest noise's power that the noise has; all of it when None.
     cutoff_hz
@@ -66,6 +76,8 @@ class Torques:
     cutoff_hz: float
     late_s: Mapping[str, float] = field(default_factory=dict)
     centre_m: Mapping[str, Real] = field(default_factory=dict)
+    forms: Mapping[FormKey, float] = field(default_factory=dict)
+    explained: Real | None = None
     level: Real | None = None
 
     @cached_property
@@ -183,6 +195,16 @@ class Torques:
         """``[joint, coarse]``."""
         return self._motion[2]
 
+    def coarse_rate(self, values: Real) -> Real:
+        """Time derivative of ``[coarse]``."""
+        found = correlate1d(values, _SLOPE, mode="nearest") * self.rate_hz
+        half = _SLOPE.size // 2
+        for a, b in self._coarse:
+            # The filter must not see beyond a stretch.
+            ends = np.gradient(values[a:b], 1.0 / self.rate_hz)
+            found[a : a + half], found[max(b - half, a) : b] = ends[:half], ends[-half:]
+        return found
+
     @cached_property
     def all_positions(self) -> Real:
         """``[dof, coarse]`` of the whole robot: joints that the log lacks rest where the description has them."""
@@ -216,14 +238,21 @@ class Torques:
     @cached_property
     def offset(self) -> Real:
         """``[joint, joint, coarse]``: torque at the second a radian that the reading of the first is too large by."""
-        step, columns = 1e-4, []
-        for one in self.joints:
-            moved = self.all_positions.copy()
-            moved[one.dof] += step
-            still = np.zeros(self.robot.model.nv)
-            v, a = self._of_dofs(self.velocity, still), self._of_dofs(self.acceleration, still)
-            columns.append(-(needed_torque(self.robot, moved, v, a).torque - self.need.torque) / step)
-        return self.of_joints(np.array(columns))
+        still = np.zeros_like(self.position[0])
+        return np.array([-self.turned(row, still + 1.0, still, still) for row in range(len(self.joints))])
+
+    def turned(self, row: int, position: Real, velocity: Real, acceleration: Real) -> Real:
+        """``[joint, coarse]``: needed torque a unit by which a joint is elsewhere than it reads."""
+        step, still = _TURN / rms(position), np.zeros(self.robot.model.nv)
+        dof = self.joints[row].dof
+        moved = (
+            self.all_positions.copy(),
+            self._of_dofs(self.velocity, still),
+            self._of_dofs(self.acceleration, still),
+        )
+        for whole, part in zip(moved, (position, velocity, acceleration), strict=True):
+            whole[dof] += step * part
+        return (self.of_joints(motion_torque(self.robot, *moved)) - self.of_joints(self.need.torque)) / step
 
     def command(self, later_s: float = 0.0) -> Real:
         """``[joint, sample]`` of the log's grid: the command as it arrives, and later still; NaN without any."""
@@ -331,6 +360,15 @@ class Torques:
     def _steps(self) -> tuple[Real, Real]:
         return steps_and_noise(self.log.position, self.log.sample_rate_hz, self.stretches)
 
+    @cached_property
+    def rest(self) -> Real:
+        """``[joint, coarse]``: what is missing beyond what was explained already."""
+        return self.missing if self.explained is None else self.missing - self.explained
+
+    def found(self, key: FormKey) -> float | None:
+        """Give the number of a law that was found between those of its grid."""
+        return self.forms.get(key)
+
     @property
     def resolution(self) -> Real:
         """``[joint]``: steps of the encoders; 0 where none show."""
@@ -387,9 +425,18 @@ class Torques:
         # Whatever the filter mixes in.
         return (self.smooth(rests.astype(np.float64)) < _MIXED) & self.driven[:, None]
 
-    def with_guesses(self, late_s: Mapping[str, float], centre_m: Mapping[str, Real]) -> Self:
-        """Give the same with delays and centres of payloads guessed: nothing but their columns changes."""
+    def with_guesses(
+        self,
+        late_s: Mapping[str, float],
+        centre_m: Mapping[str, Real],
+        forms: Mapping[FormKey, float],
+        explained: Real,
+    ) -> Self:
+        """Give the same with delays, centres of payloads and forms guessed: nothing but their columns changes."""
         other = copy(self)
+        object.__setattr__(other, "forms", dict(forms))
+        object.__setattr__(other, "explained", explained)
+        vars(other).pop("rest", None)
         object.__setattr__(other, "late_s", dict(late_s))
         object.__setattr__(other, "centre_m", dict(centre_m))
         # Made for other delays.
@@ -403,6 +450,11 @@ class Torques:
         # Where nobody commands a joint nothing comes late.
         earlier = np.nan_to_num(self.command(first) - self.command(last))
         return self.kp[:, None] * self.smooth(earlier) / (last - first)
+
+
+def rms(values: Real) -> float:
+    """Root of the mean square, above zero."""
+    return float(np.sqrt(np.mean(values**2))) + 1e-12
 
 
 def _integral(at: Real, starts: Real, values: Real, sums: Real) -> Real:

@@ -1,0 +1,65 @@
+"""Words of links, of readings and of the world; and what tolerances allow for."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from chladni.gap.records.diagnosis import PARAMETER
+from chladni.gap.robots.term import Number, Term, at_row
+from chladni.gap.robots.torques import Torques
+from chladni.robots.dynamics import inertial_numbers
+from chladni.signals.arrays import Real
+
+WORLD = "world"
+#: Standard deviations before a log is seen: a reading (rad), a tilt (rad), a mass over the link's own.
+_READING, _TILT, _MASS = 0.05, 0.1, 0.5
+#: A payload over the heaviest link, at so many metres.
+_PAYLOAD, _REACH_M = 0.3, 0.1
+
+
+def readings(torques: Torques) -> Iterator[Term]:
+    """Encoders whose zero is elsewhere."""
+    number = Number(name="offset", unit="rad", scale=_READING)
+    for row, joint in torques.rows:
+        columns = torques.offset[row][None]
+        yield Term(word="encoder_offset", site=joint.name, columns=columns, numbers=(number,), variant="of the log")
+        if not torques.by_effort and torques.kp[row] > 0:
+            columns = at_row(torques, row, np.full(torques.missing.shape[1], torques.kp[row]))
+            yield Term(
+                word="encoder_offset", site=joint.name, columns=columns, numbers=(number,), variant="of the drive"
+            )
+
+
+def bodies(torques: Torques) -> Iterator[Term]:
+    """Tilt, payloads and wrong masses."""
+    angles = tuple(Number(name=name, unit="rad", scale=_TILT) for name in ("about_x", "about_y"))
+    yield Term(word="gravity_tilt", site=WORLD, columns=torques.tilt, numbers=angles)
+    numbers = inertial_numbers(torques.robot)
+    columns = torques.of_joints(np.moveaxis(torques.need.regressor, (2, 3), (0, 1)))
+    heavy = _PAYLOAD * float(np.max(numbers[:, 0]))
+    load = (
+        Number(name="mass", unit="kg", scale=heavy, least=0.0),
+        *(Number(name=f"moment_{axis}", unit="kg m", scale=heavy * _REACH_M) for axis in "xyz"),
+    )
+    moved = {joint.link for joint in torques.robot.joints}
+    for link, name in enumerate(torques.robot.links):
+        reach = columns[link, :4]
+        if not np.any(reach):
+            continue
+        # What is fixed to a link moves as one with it: a payload on it is one on the link.
+        if name in moved:
+            point = np.einsum(
+                "p,pjk->jk", _moments_of_point(torques.centre_m.get(name, np.zeros(3))), columns[link, 4:]
+            )
+            whole = np.concatenate([reach[:1] + point, reach[1:]])
+            yield Term(word="payload", site=name, columns=whole, numbers=load)
+        if numbers[link, 0] > 0:
+            whole = np.einsum("p,pjk->jk", numbers[link], columns[link])
+            mass = Number(name="mass", unit="1", scale=_MASS, least=-1.0)
+            yield Term(word=PARAMETER, site=f"{name}.mass", columns=whole[None], numbers=(mass,))
+
+
+def _moments_of_point(centre: Real) -> Real:
+    """Moments of inertia of a unit of mass at a place, about the origin: xx, yy, zz, xy, xz, yz."""
+    x, y, z = centre
+    return np.array([y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])

@@ -1,0 +1,127 @@
+"""Words of drives: gains, delays, lags, limits, dead zones."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from chladni.gap.robots.term import Number, Term, at_row, formed, units
+from chladni.gap.robots.torques import ALL_COMMANDS, Torques
+from chladni.robots.robot import RobotJoint
+from chladni.signals.arrays import Real
+
+#: Quantiles of the drive's torque (of the command's speed) at which a limit is tried, and a dead zone.
+_LIMITS, _WIDTHS = (0.8, 0.9, 0.96), (0.15, 0.3, 0.5)
+#: Standard deviations before a log is seen: a gain, a delay (s), a lag (s).
+_GAIN, _DELAY_S, _LAG_S = 0.3, 0.01, 0.02
+#: One over a gain, less one, of a drive that gives ten times what it's asked for.
+_MOST_GAIN = -0.9
+
+
+def drives(torques: Torques) -> Iterator[Term]:
+    """Give what drives do otherwise than their servos say."""
+    for row, joint in torques.rows:
+        # In units of what was asked the motion needs 1/gain times its torque: so no gain explains all by being small.
+        over = Number(name="over_gain", unit="1", scale=_GAIN, least=_MOST_GAIN, nominal=1.0)
+        columns = at_row(torques, row, torques.wanted[row])
+        yield Term(word="gain_error", site=joint.name, columns=columns, numbers=(over,))
+    if torques.by_effort:
+        return
+    yield from _commands(torques)
+    for row, joint in torques.rows:
+        lagging = torques.smooth(np.gradient(torques.fast_drive[row], 1.0 / torques.log.sample_rate_hz))
+        lag = Number(name="time_constant", unit="s", scale=_LAG_S, least=0.0)
+        yield Term(word="lag", site=joint.name, columns=at_row(torques, row, lagging), numbers=(lag,))
+        yield from _saturation(torques, row, joint)
+        yield from _dead_zone(torques, row, joint)
+        yield from _rate_limit(torques, row, joint)
+
+
+def _part() -> Number:
+    """All of what a limit takes is missing; the part tells how well its form was tried."""
+    return Number(name="part", unit="1", scale=1.0, least=0.5)
+
+
+def _saturation(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
+    asked = torques.fast_drive[row]
+
+    def make(limit: float) -> Term:
+        cut = torques.smooth(asked - np.clip(asked, -limit, limit))
+        return _of_drive(torques, row, "saturation", cut)
+
+    yield from _limits(torques, row, make, np.quantile(np.abs(asked), _LIMITS), "limit", units(joint)[0])
+
+
+def _dead_zone(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
+    asked = torques.fast_drive[row]
+
+    def make(width: float) -> Term:
+        return _of_drive(torques, row, "dead_zone", torques.smooth(np.clip(asked, -width, width)))
+
+    yield from _limits(torques, row, make, np.quantile(np.abs(asked), _WIDTHS), "width", units(joint)[0])
+
+
+def _rate_limit(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
+    """A reference that follows commands no faster than so, as drives with a profile do."""
+    command = torques.command()[row] if torques.log.command_kind == "position" else None
+    if command is None or not np.all(np.isfinite(command)):
+        return
+    rates = np.abs(np.diff(command)) * torques.log.sample_rate_hz
+    # Commands that are held step; what they go at is what smooth ones would.
+    smooth = np.abs(torques.coarse_rate(torques.smooth(command)))
+    if not np.any(rates > 0):
+        return
+
+    def make(rate: float) -> Term:
+        behind = command - _followed(command, rate / torques.log.sample_rate_hz, torques.stretches)
+        return _of_drive(torques, row, "rate_limit", torques.kp[row] * torques.smooth(behind))
+
+    unit = "rad/s" if joint.kind == "hinge" else "m/s"
+    yield from _limits(torques, row, make, np.quantile(smooth, _LIMITS), "rate", unit)
+
+
+def _followed(command: Real, step: float, stretches: tuple[tuple[int, int], ...]) -> Real:
+    """Follow a command by at most so much a sample."""
+    found = command.copy()
+    for first, last in stretches:
+        state, path = float(command[first]), []
+        for each in command[first:last].tolist():
+            state += min(max(each - state, -step), step)
+            path.append(state)
+        found[first:last] = path
+    return found
+
+
+def _limits(
+    torques: Torques, row: int, make: Callable[[float], Term], grid: Real, name: str, unit: str
+) -> Iterator[Term]:
+    """Give the terms at quantiles that differ."""
+    if grid[0] > 0 and np.all(np.diff(grid) > 0):
+        word = make(float(grid[0])).word
+        found = torques.found((word, torques.joints[row].name, None))
+        yield from formed(make, grid, name=name, unit=unit, found=found)
+
+
+def _of_drive(torques: Torques, row: int, word: str, column: Real) -> Term:
+    columns = at_row(torques, row, column)
+    return Term(word=word, site=torques.joints[row].name, columns=columns, numbers=(_part(),))
+
+
+def _commands(torques: Torques) -> Iterator[Term]:
+    if torques.log.command_kind != "position":
+        return
+    believed, common = torques.robot.delay_s, torques.late_s.get(ALL_COMMANDS, 0.0)
+    delay = Number(name="delay", unit="s", scale=_DELAY_S, least=-believed, nominal=believed)
+    yield Term(word="delay", site=ALL_COMMANDS, columns=torques.late(0.0, common)[None], numbers=(delay,))
+    for row, joint in torques.rows:
+        late = torques.late(common, torques.late_s.get(joint.name, 0.0))
+        delay = Number(name="delay", unit="s", scale=_DELAY_S, least=-believed - common)
+        yield Term(word="delay", site=joint.name, columns=at_row(torques, row, late[row]), numbers=(delay,))
+        damped = torques.kd[row] * torques.velocity[row]
+        yield Term(
+            word="controller_gain", site=joint.name,
+            columns=at_row(torques, row, torques.wanted[row] + damped, damped),
+            numbers=(
+                Number(name="over_kp", unit="1", scale=_GAIN, least=_MOST_GAIN, nominal=1.0),
+                Number(name="kd_over_kp", unit="1", scale=_GAIN),
+            ),
+        )  # fmt: skip

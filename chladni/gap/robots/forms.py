@@ -1,0 +1,44 @@
+"""Numbers that laws aren't linear in, searched between those of their grids."""
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.term import Form, Term
+from chladni.gap.robots.torques import FormKey
+
+#: Of a form's interval: how well it's searched, and how far on either side its curvature is looked at.
+_WELL, _ASIDE = 0.01, 0.1
+_FITS = 14
+
+Forms = dict[FormKey, float]
+
+
+def refined(contest: Contest, best: Fit) -> tuple[Forms, Forms]:
+    """Give the most probable number of each law's form, one after another, and their standard deviations."""
+    forms: Forms = {}
+    spread: Forms = {}
+    small = contest.narrowed(best.terms)
+    for term in best.terms:
+        if term.form is not None:
+            key = term.word, term.site, term.variant
+            rest = small.narrowed([one for one in small.terms if one is not term])
+            found, spread[key] = _found(rest, best, term.form)
+            forms[key], small = found.form_value, rest.joined(found)
+    return forms, spread
+
+
+def _found(rest: Contest, best: Fit, form: Form) -> tuple[Term, float]:
+    """Give the term with its best form, and the form's standard deviation, at most that of its interval."""
+
+    def lost(value: float) -> float:
+        term = form.at(value)
+        return -rest.joined(term).fit([*rest.terms, term], best).nats
+
+    low, high = form.low, form.high
+    options = {"xatol": _WELL * (high - low), "maxiter": _FITS}
+    found = float(minimize_scalar(lost, bounds=(low, high), method="bounded", options=options).x)
+    step = _ASIDE * (high - low)
+    curvature = (lost(found - step) - 2.0 * lost(found) + lost(found + step)) / step**2
+    uniform = (high - low) / np.sqrt(12.0)
+    return form.at(found), float(min(1.0 / np.sqrt(curvature), uniform) if curvature > 0 else uniform)

@@ -1,0 +1,210 @@
+"""Words of what acts at joints: friction, loops, springs, stops, ripple, rotors."""
+
+from collections.abc import Iterator
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from chladni.gap.robots.term import FOUND, Form, Number, Term, at_row, formed, law, length, units, usual
+from chladni.gap.robots.torques import Torques, rms
+from chladni.robots.robot import RobotJoint
+from chladni.signals.arrays import Real
+
+#: Of its usual speed: where Stribeck's rise ends, in turn.
+_STRIBECK = (0.05, 0.15, 0.4)
+#: Of a joint's motion: over which friction of either way builds up. A joint that yields less slides.
+_SLIDES, _YIELDS = (0.01, 0.03, 0.08), (0.16, 0.32, 0.64)
+#: Quantiles of a joint's way at which a stop begins.
+_STOPS = (0.6, 0.75, 0.85, 0.93)
+#: Friction that grows with the load, before a log is seen.
+_BY_LOAD = 0.3
+#: Fewest waves of a ripple that a joint passes; lines between two that can be told apart; highest peaks that are tried.
+_WAVES, _FINE, _PEAKS = 3.0, 4, 2
+#: Waves over a joint's way that are looked for at most.
+_MOST_WAVES = 128
+
+
+def friction(torques: Torques) -> Iterator[Term]:
+    """Friction of single joints."""
+    for row, joint in torques.rows:
+        often, speed = usual(torques, row), rms(torques.velocity[row])
+        force, damping, _ = units(joint)
+        sign, fast = torques.sign[row], torques.fast_velocity[row]
+        dry = Number(name="force", unit=force, scale=often, least=-joint.friction, nominal=joint.friction)
+        one = partial(law, torques, row)
+        yield one("coulomb_friction", (sign,), dry)
+        wet = Number(
+            name="coefficient", unit=damping, scale=often / speed, least=-joint.damping, nominal=joint.damping
+        )
+        yield one("viscous_friction", (torques.velocity[row],), wet)
+        unit = f"{force} s^2/rad^2" if joint.kind == "hinge" else "N s^2/m^2"
+        square = Number(name="coefficient", unit=unit, scale=often / speed**2, least=0.0)
+        yield one("quadratic_damping", (torques.smooth(fast * np.abs(fast)),), square)
+        # What the drive gives holds the friction itself: the load is what the motion needs.
+        carried = np.abs(torques.of_joints(torques.need.torque)[row]) * sign
+        by_load = Number(name="coefficient", unit="1", scale=_BY_LOAD, least=0.0)
+        yield one("load_friction", (sign, carried), dry, by_load)
+        yield from _stribeck(torques, row, joint, dry)
+        yield from _loops(torques, row, joint, dry)
+
+
+def _stribeck(torques: Torques, row: int, joint: RobotJoint, dry: Number) -> list[Term]:
+    fast, unit = torques.fast_velocity[row], "rad/s" if joint.kind == "hinge" else "m/s"
+    rise = Number(name="rise", unit=dry.unit, scale=dry.scale, least=0.0)
+
+    def make(speed: float) -> Term:
+        fades = np.exp(-((fast / speed) ** 2))
+        columns = (torques.sign[row], torques.smooth(torques.fast_sign[row] * fades))
+        return law(torques, row, "stribeck_friction", columns, dry, rise)
+
+    grid = np.array(_STRIBECK) * rms(torques.velocity[row])
+    found = torques.found(("stribeck_friction", joint.name, None))
+    return formed(make, grid, name="speed", unit=unit, found=found)
+
+
+def _loops(torques: Torques, row: int, joint: RobotJoint, dry: Number) -> Iterator[Term]:
+    """Dahl's loop: friction that builds up over a way (Dahl 1968), a short one where a joint slides."""
+    motion = float(np.std(torques.position[row])) + 1e-12
+    loop = Number(name="force", unit=dry.unit, scale=dry.scale, least=0.0)
+    for word, shares, number, variant in (
+        ("coulomb_friction", _SLIDES, dry, "presliding"),
+        ("hysteresis", _YIELDS, loop, None),
+    ):
+
+        def make(yields: float, word: str = word, number: Number = number, variant: str | None = variant) -> Term:
+            built_up = torques.smooth(_dahl(torques.fast_position[row], yields, torques.stretches))
+            return law(torques, row, word, (built_up,), number, variant=variant)
+
+        found = torques.found((word, joint.name, variant))
+        yield from formed(make, np.array(shares) * motion, name="yield", unit=length(joint), found=found)
+
+
+def _dahl(position: Real, yields: float, stretches: tuple[tuple[int, int], ...]) -> Real:
+    """Friction over its level, by how a joint moved: exact between reversals."""
+    found = np.zeros_like(position)
+    for first, last in stretches:
+        steps = np.diff(position[first:last])
+        turns = np.flatnonzero(np.diff(np.sign(steps)) != 0) + 1
+        state = 0.0
+        for a, b in pairwise([0, *turns.tolist(), steps.size]):
+            sense = float(np.sign(steps[a]))
+            way = np.abs(position[first + a + 1 : first + b + 1] - position[first + a])
+            part = sense - (sense - state) * np.exp(-way / yields) if sense else np.full(b - a, state)
+            found[first + a + 1 : first + b + 1] = part
+            state = float(part[-1])
+    return found
+
+
+def coupled(torques: Torques) -> Iterator[Term]:
+    """Friction of the sum or difference of two speeds in a wrist: its last motor drives through the joint before."""
+    robot = torques.robot
+    inner = {one for one in torques.joints for other in torques.joints if robot.is_behind(one, other)}
+    for row, (one, other) in enumerate(pairwise(torques.joints)):
+        if not (one.kind == other.kind == "hinge" and robot.is_behind(one, other)) or other in inner:
+            continue
+        often = min(usual(torques, row), usual(torques, row + 1))
+        for sense, variant in ((1.0, "sum"), (-1.0, "difference")):
+            fast = torques.fast_velocity[row] + sense * torques.fast_velocity[row + 1]
+            smooth = torques.velocity[row] + sense * torques.velocity[row + 1]
+            sign = torques.smooth(np.tanh(fast / np.hypot(*torques.slow[row : row + 2])))
+            dry = Number(name="force", unit="N m", scale=often, least=0.0)
+            wet = Number(name="coefficient", unit="N m s/rad", scale=often / rms(smooth), least=0.0)
+            for word, column, number in (("coulomb_friction", sign, dry), ("viscous_friction", smooth, wet)):
+                columns = at_row(torques, row, column) + sense * at_row(torques, row + 1, column)
+                yield Term(
+                    word=word, site=f"{one.name}~{other.name}", columns=columns, numbers=(number,),
+                    rows=(row, row + 1), variant=variant,
+                )  # fmt: skip
+
+
+def springs(torques: Torques) -> Iterator[Term]:
+    """Springs beside a joint, and stops inside its way."""
+    for row, joint in torques.rows:
+        often, mean = usual(torques, row), float(np.mean(torques.position[row]))
+        travel = rms(torques.position[row] - mean)
+        force, _, stiffness = units(joint)
+        pull = Number(name="stiffness", unit=stiffness, scale=often / travel, least=0.0)
+        constant = Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel))
+        columns = (torques.position[row], np.ones_like(torques.position[row]))
+        yield law(torques, row, "joint_spring", columns, pull, constant)
+        for side in (1.0, -1.0):
+            yield from _stop(torques, row, joint, side, pull)
+
+
+def _stop(torques: Torques, row: int, joint: RobotJoint, side: float, pull: Number) -> list[Term]:
+    way = side * torques.fast_position[row]
+    variant = "above" if side > 0 else "below"
+
+    def make(clearance: float) -> Term:
+        pressed = torques.smooth(side * np.maximum(way - clearance, 0.0))
+        return law(torques, row, "one_sided_stop", (pressed,), pull, variant=variant)
+
+    grid = np.quantile(side * torques.position[row], _STOPS)
+    if np.any(np.diff(grid) <= 0):
+        return []
+    found = torques.found(("one_sided_stop", joint.name, variant))
+    return formed(
+        make, grid, name="clearance", unit=length(joint), found=found,
+        count=2 * len(_STOPS),
+    )  # fmt: skip
+
+
+def inertia(torques: Torques) -> Iterator[Term]:
+    """Rotors."""
+    for row, joint in torques.rows:
+        number = Number(
+            name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", least=-joint.armature,
+            nominal=joint.armature, scale=usual(torques, row) / rms(torques.acceleration[row]),
+        )  # fmt: skip
+        columns = at_row(torques, row, torques.acceleration[row])
+        yield Term(word="armature", site=joint.name, columns=columns, numbers=(number,))
+
+
+def ripple(torques: Torques) -> Iterator[Term]:
+    """Torque that is periodic in the angle (cogging, gear mesh), of the periods that the rest holds most of."""
+    for row, joint in torques.rows:
+        periods, count = _periods(torques, row)
+        name, position = joint.name, torques.fast_position[row]
+        found = torques.found(("ripple", name, None))
+        number = partial(Number, unit=units(joint)[0], scale=usual(torques, row))
+
+        def make(period: float, row: int = row, position: Real = position, number: partial[Number] = number) -> Term:
+            turns = 2.0 * np.pi / period * position
+            columns = (torques.smooth(np.sin(turns)), torques.smooth(np.cos(turns)))
+            return law(torques, row, "ripple", columns, number(name="sine"), number(name="cosine"))
+
+        way = float(np.ptp(torques.position[row]))
+        for place, period in [*enumerate(periods), *([] if found is None else [(FOUND, found)])]:
+            # Where one can be told from the next.
+            near = 0.5 * period**2 / way
+            form = Form(
+                name="period", unit=length(joint), value=period, place=place, low=period - near, high=period + near,
+                count=count, make=make,
+            )  # fmt: skip
+            yield form.term()
+
+
+def _periods(torques: Torques, row: int) -> tuple[list[float], int]:
+    """Periods whose waves hold most of the rest at a joint, and how many could be told apart."""
+    q, rest = torques.position[row], torques.rest[row]
+    way, speed = float(np.ptp(q)), rms(torques.velocity[row])
+    lowest, highest = 2.0 * np.pi * _WAVES / way, 2.0 * np.pi * torques.cutoff_hz / speed
+    if not lowest < highest:
+        return [], 1
+    waves = np.arange(lowest, highest, 2.0 * np.pi / way / _FINE)[: _MOST_WAVES * _FINE]
+    # What moves with the joint as other words do is none.
+    smooth = [np.ones_like(q), q, q**2, q**3, torques.velocity[row], torques.acceleration[row], torques.sign[row],
+              torques.drive[row], torques.wanted[row]]  # fmt: skip
+    there = torques.moving[row]
+    basis, _ = np.linalg.qr(np.array(smooth)[:, there].T)
+    turns = np.exp(1j * waves[:, None] * q[there])
+    parts = np.stack([turns.real, turns.imag], axis=1)
+    parts -= (parts @ basis) @ basis.T
+    alone = rest[there] - basis @ (basis.T @ rest[there])
+    right = parts @ alone
+    gram = np.einsum("wpk,wqk->wpq", parts, parts) + 1e-9 * np.eye(2)
+    held = np.einsum("wp,wp->w", right, np.linalg.solve(gram, right[..., None])[..., 0])
+    inner = np.flatnonzero((held >= np.roll(held, 1)) & (held >= np.roll(held, -1)))
+    best = inner[np.argsort(held[inner])[::-1][:_PEAKS]]
+    return (2.0 * np.pi / waves[best]).tolist(), max(waves.size // _FINE, 1)

@@ -1,0 +1,185 @@
+"""What a word adds to the missing torque of a robot at a site: columns of numbers to be found."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from chladni.gap.robots.torques import Torques
+from chladni.robots.robot import RobotJoint
+from chladni.signals.arrays import Real
+
+#: Place of a form that was found, beside those of the grid that it's searched on.
+FOUND = -1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Number:
+    """A number of a term.
+
+    Attributes
+    ----------
+    scale
+        Standard deviation before the log is seen: what would be a usual part of the torque.
+    least
+        What it can't be below, beside the nominal one.
+    nominal
+        What the description believes, which is added when it's told.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    least: float = -np.inf
+    nominal: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Form:
+    """A number that a law isn't linear in.
+
+    Attributes
+    ----------
+    name, unit, value
+        The number.
+    place
+        On the grid that it's searched on; `FOUND` when it was searched between.
+    low, high
+        Between which the best one lies if this is the best of the grid.
+    count
+        Of the forms that a log could tell apart.
+    make
+        Gives the law with a value.
+    """
+
+    name: str
+    unit: str
+    value: float
+    place: int
+    low: float
+    high: float
+    count: int
+    make: Callable[[float], "Term"]
+
+    def term(self) -> "Term":
+        """Give the law with this form."""
+        return replace(self.make(self.value), form=self)
+
+    def at(self, value: float) -> "Term":
+        """Give the law with another value, as one that was found."""
+        return replace(self, value=value, place=FOUND).term()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Term:
+    """A word at a site, with the columns of its numbers.
+
+    Attributes
+    ----------
+    word, site, variant
+        What, where, and which kind of it.
+    columns
+        ``[number, joint, coarse]``: missing torque a unit of each number.
+    numbers
+        One a column.
+    rows
+        Of the joints whose law this idealises; none where the physics is exact.
+    form
+        The number that its columns aren't linear in, if there's one.
+    """
+
+    word: str
+    site: str
+    columns: Real
+    numbers: tuple[Number, ...]
+    rows: tuple[int, ...] = ()
+    variant: str | None = None
+    form: Form | None = None
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Word and site."""
+        return self.word, self.site
+
+    @property
+    def kind(self) -> tuple[str, str | None, int]:
+        """What terms of several joints have in common."""
+        return self.word, self.variant, 0 if self.form is None else self.form.place
+
+    @property
+    def form_value(self) -> float:
+        """The form's number; not one where the law has none."""
+        return float("nan") if self.form is None else self.form.value
+
+    @property
+    def scale(self) -> Real:
+        """``[number]``."""
+        return np.array([one.scale for one in self.numbers])
+
+    @property
+    def least(self) -> Real:
+        """``[number]``."""
+        return np.array([one.least for one in self.numbers])
+
+    @property
+    def nominal(self) -> Real:
+        """``[number]``."""
+        return np.array([one.nominal for one in self.numbers])
+
+    def holds(self, other: "Term") -> bool:
+        """Whether this is another law with more numbers, of which the first are the other's."""
+        count = len(other.numbers)
+        return len(self.numbers) > count and np.array_equal(self.columns[:count], other.columns)
+
+
+def formed(
+    make: Callable[[float], Term], grid: Real, *, name: str, unit: str, found: float | None = None,
+    count: int | None = None,
+) -> list[Term]:  # fmt: skip
+    """Give the terms of a law at the values of a form on a growing grid, and at the one that was found."""
+    step = np.diff(grid)
+    # Before the first and behind the last as far as to the next; a form that is positive stays so.
+    before = grid[0] - step[0] if grid[0] <= 0 or grid[0] > step[0] else 0.1 * grid[0]
+    edges = [float(before), *grid.tolist(), float(grid[-1] + step[-1])]
+    forms = [
+        Form(name=name, unit=unit, value=value, place=place, low=edges[place], high=edges[place + 2],
+             count=count or grid.size, make=make)
+        for place, value in enumerate(grid.tolist())
+    ]  # fmt: skip
+    terms = [one.term() for one in forms]
+    if found is not None:
+        near = forms[int(np.argmin(np.abs(grid - found)))]
+        terms.append(replace(near, low=min(near.low, found), high=max(near.high, found)).at(found))
+    return terms
+
+
+def at_row(torques: Torques, row: int, *columns: Real) -> Real:
+    """Give ``[number, joint, coarse]`` of columns of one joint."""
+    found = np.zeros((len(columns), *torques.missing.shape))
+    found[:, row] = columns
+    return found
+
+
+def usual(torques: Torques, row: int) -> float:
+    """Torque that a joint usually gives."""
+    return max(float(np.std(torques.drive[row])), float(torques.highest_noise[row]))
+
+
+def units(joint: RobotJoint) -> tuple[str, str, str]:
+    """Of a force, a damping and a stiffness."""
+    return ("N m", "N m s/rad", "N m/rad") if joint.kind == "hinge" else ("N", "N s/m", "N/m")
+
+
+def length(joint: RobotJoint) -> str:
+    """Unit of a position."""
+    return "rad" if joint.kind == "hinge" else "m"
+
+
+def law(
+    torques: Torques, row: int, word: str, columns: tuple[Real, ...], *numbers: Number, variant: str | None = None
+) -> Term:
+    """Give a law of one joint."""
+    return Term(
+        word=word, site=torques.joints[row].name, columns=at_row(torques, row, *columns), numbers=numbers, rows=(row,),
+        variant=variant,
+    )  # fmt: skip

@@ -1,0 +1,70 @@
+"""What a robot's tolerances allow for, as columns of missing torque."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from chladni.gap.robots.term import at_row, usual
+from chladni.gap.robots.torques import Torques, rms
+from chladni.robots.dynamics import inertial_numbers
+from chladni.robots.robot import Robot
+from chladni.signals.arrays import Real
+
+#: Half the period of a servo's loop at 1 kHz.
+LOOP_S = 5e-4
+
+
+def tolerances(torques: Torques) -> tuple[Real, list[str]]:
+    """Give columns ``[number, joint, coarse]``, of a standard deviation each, and names of what tolerances allow."""
+    tolerance = torques.robot.tolerance
+    found = list(_of_links(torques))
+    for row, joint in torques.rows:
+        if joint.armature > 0:
+            own = joint.armature * torques.acceleration[row]
+            found.append((f"{joint.name}.armature", tolerance.inertia * at_row(torques, row, own)[0]))
+        if tolerance.friction > 0:
+            found.append((f"{joint.name}.friction", tolerance.friction * at_row(torques, row, torques.sign[row])[0]))
+        if tolerance.gains > 0 and not torques.by_effort and torques.log.command_kind == "position":
+            damped = torques.kd[row] * torques.velocity[row]
+            both = at_row(torques, row, torques.wanted[row] + damped, damped) * tolerance.gains
+            found += zip((f"{joint.name}.kp", f"{joint.name}.kd"), both, strict=True)
+    if not torques.by_effort and torques.log.command_kind == "position":
+        # A digital servo holds what it reads for a period.
+        found.append(("loop", -LOOP_S * torques.loop))
+    if torques.by_effort and torques.log.command is not None and torques.log.command_kind == "position":
+        # Efforts are sampled while commands are held: always just after a step, or just before it.
+        between = torques.smooth(np.nan_to_num(torques.command() - torques.log.command))
+        for row, joint in torques.rows:
+            stiffness = torques.kp[row] or usual(torques, row) / rms(
+                torques.position[row] - np.mean(torques.position[row])
+            )
+            found.append((f"{joint.name}.hold", at_row(torques, row, stiffness * between[row])[0]))
+    columns = np.array([column for _, column in found]).reshape(-1, *torques.missing.shape)
+    return columns, [name for name, _ in found]
+
+
+def _of_links(torques: Torques) -> Iterator[tuple[str, Real]]:
+    """Relative errors of mass, centre of mass and moments of inertia of every link that moves."""
+    regressor = torques.of_joints(np.moveaxis(torques.need.regressor, (2, 3), (0, 1)))
+    for changes, columns, link in zip(tolerated_inertia(torques.robot), regressor, torques.robot.links, strict=True):
+        if np.any(changes) and np.any(columns):
+            for name, column in zip(INERTIAL_NAMES, np.einsum("np,pjk->njk", changes, columns), strict=True):
+                yield f"{link}.{name}", column
+
+
+INERTIAL_NAMES = ("mass", "x", "y", "z", "xx", "yy", "zz", "xy", "xz", "yz")
+
+
+def tolerated_inertia(robot: Robot) -> Real:
+    """Give ``[link, number, 10]``: by how much each of `INERTIAL_NAMES` may change the inertial numbers, one sigma.
+
+    The mass changes them all; a first moment or an inertia itself alone.
+    """
+    found = np.zeros((len(robot.links), len(INERTIAL_NAMES), len(INERTIAL_NAMES)))
+    for changes, own in zip(found, inertial_numbers(robot), strict=True):
+        # About the link's origin; a body is as long as its inertia over its mass says.
+        mass, inertia = own[0], float(np.sum(own[4:7])) / 2.0
+        if mass > 0:
+            np.fill_diagonal(changes, [0.0, *[np.sqrt(mass * inertia)] * 3, *[inertia] * 6])
+            changes[0] = own
+    return robot.tolerance.inertia * found
