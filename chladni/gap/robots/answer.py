@@ -28,7 +28,8 @@ from chladni.gap.records.diagnosis import (
 )
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forward import Confirmed, confirmed, machine_of
-from chladni.gap.robots.remarks import remarks_on
+from chladni.gap.robots.pushes import Push
+from chladni.gap.robots.remarks import pushes_told, remarks_on
 from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.solved import Solved
 from chladni.gap.robots.term import Term
@@ -99,7 +100,7 @@ class Answer:
     def unexplained(self) -> tuple[int, ...]:
         """Rows of joints at which something acts that no word explains."""
         # Where a term isn't named, what it stands for is unknown.
-        doubted = {row for one in self.weighed if one not in self.named for row in one.acts}
+        doubted = {row for one in self.weighed if one not in self.named and one.gain > TEMPER for row in one.acts}
         beyond = np.flatnonzero(self._contest.unknowns(self._best) > TEMPER)
         named = {row for one in self.named for row in one.acts}
         return tuple(sorted({*beyond.tolist(), *(doubted - named)}))
@@ -109,7 +110,7 @@ class Answer:
         """A name, a value, nothing, or something without a name."""
         if self.named:
             return "parameters" if all(one.candidate.effect == PARAMETER for one in self.named) else "effect"
-        return "unknown" if self.unexplained or self.denied is not None else "none"
+        return "unknown" if self.unexplained or self.denied is not None or self.solved.pushes else "none"
 
     @cached_property
     def closing(self) -> Closing:
@@ -121,7 +122,7 @@ class Answer:
     def diagnosis(self) -> Diagnosis:
         """Give the record."""
         solved = self.solved
-        joints = [solved.torques.joints[row].name for row in self.unexplained]
+        joints = [solved.torques.name_of(row) for row in self.unexplained]
         return Diagnosis(
             model=solved.torques.robot.name,
             logs=(solved.torques.log.log,),
@@ -133,7 +134,7 @@ class Answer:
             gap=self.closing,
             tuned_parameters=tuned_parameters(solved),
             remarks=remarks_on(solved, joints if self.named else ()),
-            advice=_advice(self.verdict, joints, self.denied),
+            advice=_advice(self.verdict, joints, self.denied, self.solved.pushes),
             signals=_signals(solved),
             machine=machine_of(self._contest, self._contest.fit([one.term for one in self.named])),
             answer_set=tuple(dict.fromkeys(each for one in self.weighed for each in (one.candidate, *one.others))),
@@ -153,8 +154,8 @@ class Weighed:
         Rows of the joints that it changes.
     is_told
         Whether its first number is beyond its uncertainty, and not at the edge of what it can be.
-    nats
-        That it's worth beside the others.
+    nats, gain
+        That it's worth beside the others, and beside nothing.
     """
 
     term: Term
@@ -167,6 +168,7 @@ class Weighed:
     parameters: dict[str, FittedNumber]
     is_told: bool
     nats: float
+    gain: float
 
     @property
     def cause(self) -> Cause:
@@ -218,6 +220,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
         parameters=_parameters(solved, place, candidate),
         is_told=_is_told(best, place),
         nats=best.nats - max(rest.nats, unknown),
+        gain=best.nats - rest.nats,
     )
 
 
@@ -233,7 +236,7 @@ def _is_told(best: Fit, place: int) -> bool:
 def _candidate(solved: Solved, place: int) -> Candidate:
     """What a term is called: less friction, damping or armature than the description has is a wrong value of it."""
     term = solved.best.terms[place]
-    if term.word in _STATED and len(term.rows) < _PAIR and solved.best.values(place)[0][0] < term.nominal[0]:
+    if term.word in _STATED and not term.is_coupling and solved.best.values(place)[0][0] < term.nominal[0]:
         return Candidate(effect=PARAMETER, site=f"{term.site}.{_STATED[term.word]}")
     return Candidate(effect=term.word, site=term.site)
 
@@ -275,8 +278,6 @@ def tuned_parameters(solved: Solved) -> dict[str, FittedNumber]:
     return found
 
 
-#: Rows of a law between two joints.
-_PAIR = 2
 #: Of its tolerance: a number that stays wider isn't told by the log.
 _NARROWED = 0.9
 
@@ -290,7 +291,7 @@ def _ranking(weighed: Sequence[Weighed]) -> Iterator[Ranked]:
 def _where(solved: Solved, fit: Fit) -> Where:
     torques = solved.torques
     rows = [row for row, _ in torques.rows]
-    residual, drive = (torques.missing - solved.contest.explained(fit))[rows], torques.drive[rows]
+    residual, drive = _whole(torques, torques.missing - solved.contest.explained(fit))[rows], torques.asked[rows]
     power, usual = np.mean(relative_residual(residual, drive) ** 2, axis=1), _usual(torques)[rows]
     shares = power / power.sum() if power.sum() > 0 else power
     rate = torques.rate_hz
@@ -313,6 +314,12 @@ def _where(solved: Solved, fit: Fit) -> Where:
     )  # fmt: skip
 
 
+def _whole(torques: Torques, missing: Real) -> Real:
+    """Give ``[joint, coarse]``: what the loops asked for beyond what was needed, where rows tell the two parts."""
+    count = len(torques.joints)
+    return missing[:count] + missing[count:] if torques.two_sided else missing
+
+
 def _of_torques(solved: Solved, named: Sequence[Term]) -> Closing:
     """How much of the missing torque the answer explains, on every other block of the log, which no fit saw."""
     torques = solved.torques
@@ -320,7 +327,7 @@ def _of_torques(solved: Solved, named: Sequence[Term]) -> Closing:
     there = torques.moving & judge
     apart = Contest(torques, taking_part=~judge)
     chosen = apart.same(named)
-    scale = _usual(torques)[:, None]
+    scale = np.resize(_usual(torques), len(torques.missing))[:, None]
 
     def left(part: Real) -> float:
         return float(np.sqrt(np.mean((((torques.missing - part) / scale)[there]) ** 2)))
@@ -380,30 +387,34 @@ def _every_other(count: int) -> Mask:
 def _signals(solved: Solved) -> GapSignals:
     """Torques of the drives beside what the motion needs: as described, and with what was found."""
     torques, contest = solved.torques, solved.contest
-    after = torques.drive - (torques.missing - contest.explained(solved.best))
+    drive, missing = torques.asked, _whole(torques, torques.missing)
+    after = drive - _whole(torques, torques.missing - contest.explained(solved.best))
+    noise = np.sqrt(_whole(torques, torques.noise**2))
     rate = torques.rate_hz
-    lines = torques.drive.shape[1] // 2 + 1
-    time_s, frequency_hz, density = gap_map(torques.missing, torques.drive, rate)
+    lines = drive.shape[1] // 2 + 1
+    time_s, frequency_hz, density = gap_map(missing, drive, rate)
     return GapSignals(
         log=torques.log.log,
         sample_rate_hz=rate,
         output_names=tuple(one.name for one in torques.joints),
         output_units=tuple("N m" if one.kind == "hinge" else "N" for one in torques.joints),
-        measured=torques.drive,
+        measured=drive,
         before=torques.wanted,
         after=after,
-        noise_rms=torques.noise,
-        noise_density=np.repeat((torques.noise**2 / (rate / 2.0))[:, None], lines, axis=1),
+        noise_rms=noise,
+        noise_density=np.repeat((noise**2 / (rate / 2.0))[:, None], lines, axis=1),
         map_time_s=time_s,
         map_frequency_hz=frequency_hz,
         gap_map=density,
-        gap_map_after=gap_map(torques.drive - after, torques.drive, rate)[2],
+        gap_map_after=gap_map(drive - after, drive, rate)[2],
     )
 
 
-def _advice(verdict: Verdict, joints: Sequence[str], denied: Confirmed | None) -> str | None:
+def _advice(verdict: Verdict, joints: Sequence[str], denied: Confirmed | None, pushes: Sequence[Push]) -> str | None:
     if verdict != "unknown":
         return None
+    if pushes and not joints and denied is None:
+        return f"{pushes_told(pushes)} Nothing else is missing: look what the robot touched then."
     if denied is not None:
         return (
             "What the torques suggest isn't named: simulated with it, the positions' error is "

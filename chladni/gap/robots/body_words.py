@@ -15,6 +15,8 @@ WORLD = "world"
 _READING, _TILT, _MASS = 0.05, 0.1, 0.5
 #: A payload over the heaviest link, at so many metres.
 _PAYLOAD, _REACH_M = 0.3, 0.1
+#: Times that reach: where nothing that is carried has its centre.
+_FAR = 3.0
 
 
 def readings(torques: Torques) -> Iterator[Term]:
@@ -23,40 +25,47 @@ def readings(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.rows:
         columns = torques.offset[row][None]
         yield Term(word="encoder_offset", site=joint.name, columns=columns, numbers=(number,), variant="of the log")
-        if not torques.by_effort and torques.kp[row] > 0:
-            columns = at_row(torques, row, np.full(torques.missing.shape[1], torques.kp[row]))
+        if (torques.two_sided or not torques.by_effort) and torques.kp[row] > 0:
+            columns = at_row(torques, torques.servo_row(row), np.full(torques.missing.shape[1], torques.kp[row]))
             yield Term(
                 word="encoder_offset", site=joint.name, columns=columns, numbers=(number,), variant="of the drive"
             )
 
 
 def bodies(torques: Torques) -> Iterator[Term]:
-    """Tilt, payloads and wrong masses."""
+    """Tilt, and wrong masses."""
     angles = tuple(Number(name=name, unit="rad", scale=_TILT) for name in ("about_x", "about_y"))
     yield Term(word="gravity_tilt", site=WORLD, columns=torques.tilt, numbers=angles)
-    numbers = inertial_numbers(torques.robot)
-    columns = torques.of_joints(np.moveaxis(torques.need.regressor, (2, 3), (0, 1)))
-    heavy = _PAYLOAD * float(np.max(numbers[:, 0]))
+    mass = Number(name="mass", unit="1", scale=_MASS, least=-1.0)
+    for name, own, columns in _links(torques):
+        if own[0] > 0:
+            whole = np.einsum("p,pjk->jk", own, columns)
+            yield Term(word=PARAMETER, site=f"{name}.mass", columns=whole[None], numbers=(mass,))
+
+
+def payloads(torques: Torques) -> Iterator[Term]:
+    """Masses that links carry, as points where they were found to be."""
+    heavy = _PAYLOAD * float(np.max(inertial_numbers(torques.robot)[:, 0]))
     load = (
         Number(name="mass", unit="kg", scale=heavy, least=0.0),
         *(Number(name=f"moment_{axis}", unit="kg m", scale=heavy * _REACH_M) for axis in "xyz"),
     )
     moved = {joint.link for joint in torques.robot.joints}
-    for link, name in enumerate(torques.robot.links):
-        reach = columns[link, :4]
-        if not np.any(reach):
-            continue
+    for name, _, columns in _links(torques):
         # What is fixed to a link moves as one with it: a payload on it is one on the link.
         if name in moved:
-            point = np.einsum(
-                "p,pjk->jk", _moments_of_point(torques.centre_m.get(name, np.zeros(3))), columns[link, 4:]
-            )
-            whole = np.concatenate([reach[:1] + point, reach[1:]])
-            yield Term(word="payload", site=name, columns=whole, numbers=load)
-        if numbers[link, 0] > 0:
-            whole = np.einsum("p,pjk->jk", numbers[link], columns[link])
-            mass = Number(name="mass", unit="1", scale=_MASS, least=-1.0)
-            yield Term(word=PARAMETER, site=f"{name}.mass", columns=whole[None], numbers=(mass,))
+            around = _moments_of_point(torques.centre_m.get(name, np.zeros(3)))
+            point = np.einsum("p,pjk->jk", around, columns[4:])
+            whole = np.concatenate([columns[:1] + point, columns[1:4]])
+            yield Term(word="payload", site=name, columns=whole, numbers=load, reach=_FAR * _REACH_M)
+
+
+def _links(torques: Torques) -> Iterator[tuple[str, Real, Real]]:
+    """Names, inertial numbers and columns of those links that the log's joints feel."""
+    columns = torques.of_joints(np.moveaxis(torques.need.regressor, (2, 3), (0, 1)))
+    for name, own, each in zip(torques.robot.links, inertial_numbers(torques.robot), columns, strict=True):
+        if np.any(each[:4]):
+            yield name, own, each
 
 
 def _moments_of_point(centre: Real) -> Real:

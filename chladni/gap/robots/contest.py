@@ -124,7 +124,10 @@ class Contest:
         self.terms = [term for term in all_terms(torques) if term.word not in left_out]
         inside, self.tolerated = tolerances(torques)
         self.within = len(inside)
-        blocks = [inside, *(term.columns * term.scale[:, None, None] for term in self.terms)]
+        blocks = [
+            self._padded(inside),
+            *(self._padded(term.columns) * term.scale[:, None, None] for term in self.terms),
+        ]
         there = torques.moving if taking_part is None else torques.moving & taking_part
         self._blocks = np.concatenate(blocks)
         self._whiten = np.sqrt(torques.numbers_a_sample) * there / torques.noise[:, None]
@@ -144,6 +147,10 @@ class Contest:
         self._before = self._energy
         self.nothing = self.fit(())
         self._before = np.array([one.energy for one in self.nothing.left])
+
+    def _padded(self, columns: Real) -> Real:
+        """Columns of the joints alone with rows of zeros for their loops."""
+        return np.pad(columns, ((0, 0), (0, len(self.torques.missing) - columns.shape[1]), (0, 0)))
 
     def _moments(self, some: Real, others: Real) -> tuple[Real, Real]:
         """Give ``[joint, some, others]`` of whitened columns, and ``[joint, some]`` with what is missing."""
@@ -169,7 +176,7 @@ class Contest:
 
     def joined(self, term: Term) -> "Contest":
         """Give the contest with one term more, at the same prices."""
-        other, columns = copy(self), term.columns * term.scale[:, None, None]
+        other, columns = copy(self), self._padded(term.columns) * term.scale[:, None, None]
         first, count = len(self._blocks), len(columns)
         other.terms = [*self.terms, term]
         other._blocks = np.concatenate([self._blocks, columns])
@@ -193,11 +200,15 @@ class Contest:
         chosen = self._chosen(terms)
         gram, right = self._gram[:, chosen[:, None], chosen], self._right[:, chosen]
         laws = self._laws(terms)
-        least = self._least[chosen]
+        least = self._least[chosen].copy()
         weight = self._start if near is None else near.weight
+        arms = self._arms(terms)
         for _ in range(_ROUNDS if near is None else _NEAR):
             curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
             numbers = _bounded(curvature, weight @ right, least)
+            for first, last, share in arms:
+                least[first] = max(share * float(np.linalg.norm(numbers[first + 1 : last])), 0.0)
+                numbers[first] = max(numbers[first], least[first])
             left = self._left(gram, right, numbers, laws)
             weight = np.array([one.weight for one in left])
         curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
@@ -234,9 +245,19 @@ class Contest:
         # A law that holds a simpler one, with another number, is one thing more.
         return nats + log(ANOTHER) * sum(len(term.scale) - 1 for term in terms if term.rows)
 
+    def _arms(self, terms: Sequence[Term]) -> list[tuple[int, int, float]]:
+        """Places of a mass and behind its moments, and the least mass a unit of moment; over their scales."""
+        found, place = [], self.within
+        for term in terms:
+            count = len(term.numbers)
+            if term.reach is not None:
+                found.append((place, place + count, float(term.scale[1] / term.scale[0] / term.reach)))
+            place += count
+        return found
+
     def _laws(self, terms: Sequence[Term]) -> list[Index]:
         """Places among the fitted numbers of each joint's own laws."""
-        found: list[list[int]] = [[] for _ in self.torques.joints]
+        found: list[list[int]] = [[] for _ in self.torques.missing]
         place = self.within
         for term in terms:
             for row in term.rows:
@@ -254,9 +275,22 @@ class Contest:
             found.append(JointLeft(energy=float(max(energy[row], 0.0)), count=float(self.count[row]), force=force))
         return tuple(found)
 
-    def promise(self, fit: Fit) -> list[tuple[float, Term]]:
-        """Give what each further term would bring at about, nats, with the joints weighed as in a fit."""
-        weight = np.array([one.weight for one in fit.left])
+    def quietest(self, fit: Fit) -> Real:
+        """Give ``[row]``: least energy over the noise that a fit leaves, or with the term more that promises most."""
+        found = [one.over_noise for one in fit.left]
+        taken = {term.key for term in fit.terms}
+        for row in range(len(found)):
+            alone = np.zeros(len(found))
+            alone[row] = 1.0
+            _, term = next(one for one in self.promise(fit, alone) if one[1].key not in taken)
+            more = self.fit([*fit.terms, term], fit)
+            found = [min(least, one.over_noise) for least, one in zip(found, more.left, strict=True)]
+        return np.array(found)
+
+    def promise(self, fit: Fit, weight: Real | None = None) -> list[tuple[float, Term]]:
+        """Give what each further term would bring at about, nats, with the rows weighed as in a fit."""
+        if weight is None:
+            weight = np.array([one.weight for one in fit.left])
         chosen = self._chosen(fit.terms)
         gram = np.tensordot(weight, self._gram[:, :, chosen], 1)
         rest = weight @ self._right - gram @ fit.numbers
@@ -268,6 +302,13 @@ class Contest:
             gain = rest[at] @ np.linalg.solve(own, rest[at]) - np.linalg.slogdet(own)[1]
             found.append((0.5 * float(gain), term))
         return sorted(found, key=lambda one: one[0], reverse=True)
+
+    def course(self, fit: Fit) -> tuple[Real, Real]:
+        """Give ``[coarse]``: energy that a fit leaves over all joints, whitened, and what noise alone would leave."""
+        rest = (self.torques.missing - self.explained(fit)) * self._whiten
+        joints = slice(len(self.torques.joints))
+        there = self.torques.numbers_a_sample * np.sum(self._whiten[joints] > 0, axis=0)
+        return np.sum(rest[joints] ** 2, axis=0), there
 
     def explained(self, fit: Fit) -> Real:
         """Give ``[joint, coarse]``: missing torque that the numbers of a fit explain."""

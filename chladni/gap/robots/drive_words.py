@@ -13,6 +13,8 @@ from chladni.signals.arrays import Real
 _LIMITS, _WIDTHS = (0.8, 0.9, 0.96), (0.15, 0.3, 0.5)
 #: Standard deviations before a log is seen: a gain, a delay (s), a lag (s).
 _GAIN, _DELAY_S, _LAG_S = 0.3, 0.01, 0.02
+#: Delays at which their column is tried beside that of a short one.
+_SECANTS_S = (0.01, 0.03)
 #: One over a gain, less one, of a drive that gives ten times what it's asked for.
 _MOST_GAIN = -0.9
 
@@ -22,18 +24,32 @@ def drives(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.rows:
         # In units of what was asked the motion needs 1/gain times its torque: so no gain explains all by being small.
         over = Number(name="over_gain", unit="1", scale=_GAIN, least=_MOST_GAIN, nominal=1.0)
-        columns = at_row(torques, row, torques.wanted[row])
+        columns = at_row(
+            torques, _limited(torques, row), (torques.answered if torques.gives else torques.wanted)[row]
+        )
         yield Term(word="gain_error", site=joint.name, columns=columns, numbers=(over,))
-    if torques.by_effort:
-        return
-    yield from _commands(torques)
+        if not torques.by_effort or torques.gives or torques.log.effort_kind != "measured":
+            yield from _saturation(torques, row, joint)
+            yield from _dead_zone(torques, row, joint)
+    if torques.two_sided or not torques.by_effort:
+        yield from _loops(torques)
+
+
+def _limited(torques: Torques, row: int) -> int:
+    """Row at which what arrives is held against what is asked for."""
+    return torques.servo_row(row) if torques.gives else row
+
+
+def _loops(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.rows:
         lagging = torques.smooth(np.gradient(torques.fast_drive[row], 1.0 / torques.log.sample_rate_hz))
         lag = Number(name="time_constant", unit="s", scale=_LAG_S, least=0.0)
-        yield Term(word="lag", site=joint.name, columns=at_row(torques, row, lagging), numbers=(lag,))
-        yield from _saturation(torques, row, joint)
-        yield from _dead_zone(torques, row, joint)
+        yield Term(
+            word="lag", site=joint.name, columns=at_row(torques, torques.servo_row(row), lagging), numbers=(lag,)
+        )
         yield from _rate_limit(torques, row, joint)
+    if torques.log.command_kind == "position":
+        yield from _gains(torques)
 
 
 def _part() -> Number:
@@ -42,22 +58,22 @@ def _part() -> Number:
 
 
 def _saturation(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
-    asked = torques.fast_drive[row]
+    asked = torques.fast_asked[row]
 
     def make(limit: float) -> Term:
         cut = torques.smooth(asked - np.clip(asked, -limit, limit))
-        return _of_drive(torques, row, "saturation", cut)
+        return _of_drive(torques, _limited(torques, row), "saturation", cut)
 
-    yield from _limits(torques, row, make, np.quantile(np.abs(asked), _LIMITS), "limit", units(joint)[0])
+    yield from _limits(make, np.quantile(np.abs(asked), _LIMITS), "limit", units(joint)[0])
 
 
 def _dead_zone(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
-    asked = torques.fast_drive[row]
+    asked = torques.fast_asked[row]
 
     def make(width: float) -> Term:
-        return _of_drive(torques, row, "dead_zone", torques.smooth(np.clip(asked, -width, width)))
+        return _of_drive(torques, _limited(torques, row), "dead_zone", torques.smooth(np.clip(asked, -width, width)))
 
-    yield from _limits(torques, row, make, np.quantile(np.abs(asked), _WIDTHS), "width", units(joint)[0])
+    yield from _limits(make, np.quantile(np.abs(asked), _WIDTHS), "width", units(joint)[0])
 
 
 def _rate_limit(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
@@ -73,10 +89,10 @@ def _rate_limit(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]
 
     def make(rate: float) -> Term:
         behind = command - _followed(command, rate / torques.log.sample_rate_hz, torques.stretches)
-        return _of_drive(torques, row, "rate_limit", torques.kp[row] * torques.smooth(behind))
+        return _of_drive(torques, torques.servo_row(row), "rate_limit", torques.kp[row] * torques.smooth(behind))
 
     unit = "rad/s" if joint.kind == "hinge" else "m/s"
-    yield from _limits(torques, row, make, np.quantile(smooth, _LIMITS), "rate", unit)
+    yield from _limits(make, np.quantile(smooth, _LIMITS), "rate", unit)
 
 
 def _followed(command: Real, step: float, stretches: tuple[tuple[int, int], ...]) -> Real:
@@ -91,37 +107,47 @@ def _followed(command: Real, step: float, stretches: tuple[tuple[int, int], ...]
     return found
 
 
-def _limits(
-    torques: Torques, row: int, make: Callable[[float], Term], grid: Real, name: str, unit: str
-) -> Iterator[Term]:
+def _limits(make: Callable[[float], Term], grid: Real, name: str, unit: str) -> Iterator[Term]:
     """Give the terms at quantiles that differ."""
     if grid[0] > 0 and np.all(np.diff(grid) > 0):
-        word = make(float(grid[0])).word
-        found = torques.found((word, torques.joints[row].name, None))
-        yield from formed(make, grid, name=name, unit=unit, found=found)
+        yield from formed(make, grid, name=name, unit=unit)
 
 
 def _of_drive(torques: Torques, row: int, word: str, column: Real) -> Term:
     columns = at_row(torques, row, column)
-    return Term(word=word, site=torques.joints[row].name, columns=columns, numbers=(_part(),))
+    site = torques.joints[row % len(torques.joints)].name
+    return Term(word=word, site=site, columns=columns, numbers=(_part(),))
 
 
-def _commands(torques: Torques) -> Iterator[Term]:
-    if torques.log.command_kind != "position":
-        return
-    believed, common = torques.robot.delay_s, torques.late_s.get(ALL_COMMANDS, 0.0)
-    delay = Number(name="delay", unit="s", scale=_DELAY_S, least=-believed, nominal=believed)
-    yield Term(word="delay", site=ALL_COMMANDS, columns=torques.late(0.0, common)[None], numbers=(delay,))
+def _gains(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.rows:
-        late = torques.late(common, torques.late_s.get(joint.name, 0.0))
-        delay = Number(name="delay", unit="s", scale=_DELAY_S, least=-believed - common)
-        yield Term(word="delay", site=joint.name, columns=at_row(torques, row, late[row]), numbers=(delay,))
         damped = torques.kd[row] * torques.velocity[row]
         yield Term(
             word="controller_gain", site=joint.name,
-            columns=at_row(torques, row, torques.wanted[row] + damped, damped),
+            columns=at_row(torques, torques.servo_row(row), torques.answered[row] + damped, damped),
             numbers=(
                 Number(name="over_kp", unit="1", scale=_GAIN, least=_MOST_GAIN, nominal=1.0),
                 Number(name="kd_over_kp", unit="1", scale=_GAIN),
             ),
         )  # fmt: skip
+
+
+def delays(torques: Torques) -> Iterator[Term]:
+    """Commands that come late: all of them, or those of a joint beside them."""
+    if torques.log.command_kind != "position" or (torques.by_effort and not torques.two_sided):
+        return
+    believed, common = torques.robot.delay_s, torques.late_s.get(ALL_COMMANDS, 0.0)
+    delay = Number(name="delay", unit="s", scale=_DELAY_S, least=-believed, nominal=believed)
+    own = Number(name="delay", unit="s", scale=_DELAY_S, least=-believed - common)
+    for secant_s in (None, *_SECANTS_S):
+        variant = None if secant_s is None else f"over {secant_s:g} s"
+        late = torques.late(0.0, common if secant_s is None else secant_s)
+        yield Term(
+            word="delay", site=ALL_COMMANDS, columns=torques.at_servos(late)[None], numbers=(delay,), variant=variant
+        )
+        late = torques.late(common, 0.0 if secant_s is None else secant_s)
+        for row, joint in torques.rows:
+            found = torques.late_s.get(joint.name, 0.0)
+            alone = torques.late(common, found)[row] if secant_s is None and found else late[row]
+            columns = at_row(torques, torques.servo_row(row), alone)
+            yield Term(word="delay", site=joint.name, columns=columns, numbers=(own,), variant=variant)

@@ -4,28 +4,36 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.term import Form, Term
 from chladni.gap.robots.torques import FormKey
 
 #: Of a form's interval: how well it's searched, and how far on either side its curvature is looked at.
 _WELL, _ASIDE = 0.01, 0.1
-_FITS = 14
+_FITS, _RIVALS = 14, 3
 
 Forms = dict[FormKey, float]
 
 
 def refined(contest: Contest, best: Fit) -> tuple[Forms, Forms]:
-    """Give the most probable number of each law's form, one after another, and their standard deviations."""
+    """Give the most probable number of each law's form and of its rivals', and their standard deviations."""
     forms: Forms = {}
     spread: Forms = {}
     small = contest.narrowed(best.terms)
-    for term in best.terms:
-        if term.form is not None:
-            key = term.word, term.site, term.variant
-            rest = small.narrowed([one for one in small.terms if one is not term])
-            found, spread[key] = _found(rest, best, term.form)
-            forms[key], small = found.form_value, rest.joined(found)
+    for place, term in enumerate(best.terms):
+        others = [one.terms[-1] for one in alternatives(contest, best, place, _RIVALS)[1:]]
+        rest = small.narrowed([one for one in small.terms if _key(one) != _key(term)])
+        # Off its grid a rival may be better than what is best on it.
+        for rival in [*others, term]:
+            if rival.form is not None:
+                found, spread[_key(rival)] = _found(rest, best, rival.form)
+                forms[_key(rival)] = found.form_value
+                small = rest.joined(found) if rival is term else small
     return forms, spread
+
+
+def _key(term: Term) -> FormKey:
+    return term.word, term.site, term.variant
 
 
 def _found(rest: Contest, best: Fit, form: Form) -> tuple[Term, float]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.solved import Solved
-from chladni.gap.robots.term import Term
+from chladni.gap.robots.term import SENSES, Term
 from chladni.gap.robots.tolerances import INERTIAL_NAMES, LOOP_S, tolerated_inertia
 from chladni.gap.robots.torques import ALL_COMMANDS, Torques
 from chladni.gap.robots.transmission_words import AT_MOTOR
@@ -170,12 +170,12 @@ class _Reading:
 
     def _couplings(self) -> Iterator[Coupling]:
         for term, values in self._terms:
-            one, _, other = term.site.partition("~")
-            if not other or term.site in self._joints:
+            if not term.is_coupling:
                 continue
+            one, _, other = term.site.partition("~")
             number, dry = max(float(values[0]), 0.0), term.word == "coulomb_friction"
             yield Coupling(
-                joints=(one, other), sense=1.0 if term.variant == "sum" else -1.0,
+                joints=(one, other), sense=SENSES[str(term.variant)],
                 friction=number if dry else 0.0, damping=0.0 if dry else number,
             )  # fmt: skip
 
@@ -218,6 +218,8 @@ def _stop(one: MachineJoint, term: Term, values: Real, _: Torques) -> MachineJoi
 
 def _transmission(one: MachineJoint, term: Term, values: Real, torques: Torques) -> MachineJoint:
     found = {number.name: float(value) for number, value in zip(term.numbers, values, strict=True)}
+    if term.form is not None:
+        found[term.form.name] = term.form.value
     rotor = max(found["inertia"], 0.0)
     first = "gap" if term.word == "backlash" else "compliance"
     # Where the log has efforts its product with the rotor is told.
@@ -303,7 +305,7 @@ def _blocks(torques: Torques) -> tuple[list[tuple[int, int]], Mask]:
 
 
 def _runs(torques: Torques, blocks: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    if torques.log.command_kind == "position" and not torques.by_effort:
+    if torques.log.command_kind == "position" and (torques.two_sided or not torques.by_effort):
         return blocks
     count = max(round(torques.log.sample_rate_hz / torques.cutoff_hz), 2)
     return [(start, min(start + count, b)) for a, b in blocks for start in range(a, b, count)]
@@ -341,15 +343,20 @@ def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -
     return found
 
 
+def _by_effort(torques: Torques) -> bool:
+    """Whether runs are driven by efforts: where loops are known they hold the joints near where they were."""
+    return torques.by_effort and not torques.two_sided
+
+
 def _kinds(torques: Torques) -> tuple[str, ...]:
-    kind = "effort" if torques.by_effort else torques.log.command_kind or "effort"
+    kind = "effort" if _by_effort(torques) else torques.log.command_kind or "effort"
     return (kind,) * len(torques.log.joints)
 
 
 def _asked(machine: Machine, torques: Torques, at_s: Real) -> Real:
     """``[joint, step]``: commands as they arrive, held; or measured efforts."""
     log = torques.log
-    if torques.by_effort:
+    if _by_effort(torques):
         return np.array([np.interp(at_s, log.time_s, row) for row in torques.unlimited])
     late = {one.joint.name: one.delay_s for one in machine.joints}
     found = np.zeros((len(log.joints), at_s.size))

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from chladni.gap.robots.term import FOUND, Form, Number, Term, at_row, formed, law, length, units, usual
+from chladni.gap.robots.term import SENSES, Form, Number, Term, at_row, formed, law, length, units, usual
 from chladni.gap.robots.torques import Torques, rms
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
@@ -59,8 +59,7 @@ def _stribeck(torques: Torques, row: int, joint: RobotJoint, dry: Number) -> lis
         return law(torques, row, "stribeck_friction", columns, dry, rise)
 
     grid = np.array(_STRIBECK) * rms(torques.velocity[row])
-    found = torques.found(("stribeck_friction", joint.name, None))
-    return formed(make, grid, name="speed", unit=unit, found=found)
+    return formed(make, grid, name="speed", unit=unit)
 
 
 def _loops(torques: Torques, row: int, joint: RobotJoint, dry: Number) -> Iterator[Term]:
@@ -76,8 +75,7 @@ def _loops(torques: Torques, row: int, joint: RobotJoint, dry: Number) -> Iterat
             built_up = torques.smooth(_dahl(torques.fast_position[row], yields, torques.stretches))
             return law(torques, row, word, (built_up,), number, variant=variant)
 
-        found = torques.found((word, joint.name, variant))
-        yield from formed(make, np.array(shares) * motion, name="yield", unit=length(joint), found=found)
+        yield from formed(make, np.array(shares) * motion, name="yield", unit=length(joint))
 
 
 def _dahl(position: Real, yields: float, stretches: tuple[tuple[int, int], ...]) -> Real:
@@ -104,7 +102,7 @@ def coupled(torques: Torques) -> Iterator[Term]:
         if not (one.kind == other.kind == "hinge" and robot.is_behind(one, other)) or other in inner:
             continue
         often = min(usual(torques, row), usual(torques, row + 1))
-        for sense, variant in ((1.0, "sum"), (-1.0, "difference")):
+        for variant, sense in SENSES.items():
             fast = torques.fast_velocity[row] + sense * torques.fast_velocity[row + 1]
             smooth = torques.velocity[row] + sense * torques.velocity[row + 1]
             sign = torques.smooth(np.tanh(fast / np.hypot(*torques.slow[row : row + 2])))
@@ -143,11 +141,7 @@ def _stop(torques: Torques, row: int, joint: RobotJoint, side: float, pull: Numb
     grid = np.quantile(side * torques.position[row], _STOPS)
     if np.any(np.diff(grid) <= 0):
         return []
-    found = torques.found(("one_sided_stop", joint.name, variant))
-    return formed(
-        make, grid, name="clearance", unit=length(joint), found=found,
-        count=2 * len(_STOPS),
-    )  # fmt: skip
+    return formed(make, grid, name="clearance", unit=length(joint), count=2 * len(_STOPS))
 
 
 def inertia(torques: Torques) -> Iterator[Term]:
@@ -166,7 +160,6 @@ def ripple(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.rows:
         periods, count = _periods(torques, row)
         name, position = joint.name, torques.fast_position[row]
-        found = torques.found(("ripple", name, None))
         number = partial(Number, unit=units(joint)[0], scale=usual(torques, row))
 
         def make(period: float, row: int = row, position: Real = position, number: partial[Number] = number) -> Term:
@@ -175,7 +168,7 @@ def ripple(torques: Torques) -> Iterator[Term]:
             return law(torques, row, "ripple", columns, number(name="sine"), number(name="cosine"))
 
         way = float(np.ptp(torques.position[row]))
-        for place, period in [*enumerate(periods), *([] if found is None else [(FOUND, found)])]:
+        for place, period in enumerate(periods):
             # Where one can be told from the next.
             near = 0.5 * period**2 / way
             form = Form(

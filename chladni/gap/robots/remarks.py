@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from chladni.gap.robots.pushes import Push
 from chladni.gap.robots.solved import Solved
 from chladni.io.log_info import some_of
 
@@ -18,11 +19,21 @@ def remarks_on(solved: Solved, unexplained: Sequence[str]) -> tuple[str, ...]:
         *torques.robot.remarks,
         *torques.log.remarks,
         *_of_joints(solved),
+        *([pushes_told(solved.pushes).removesuffix(".")] if solved.pushes else []),
         *(
             [f"at {some_of(unexplained)} no word explains what is missing beside the named causes"]
             if unexplained
             else []
         ),
+    )
+
+
+def pushes_told(pushes: Sequence[Push]) -> str:
+    """Say where and when something pushed."""
+    return " ".join(
+        f"Something pushes at {some_of(one.joints)} from {one.start_s:.2f} s to {one.end_s:.2f} s, by up to "
+        f"{one.torque:.3g} N m."
+        for one in pushes
     )
 
 
@@ -40,7 +51,9 @@ def _of_joints(solved: Solved) -> list[str]:
         )
     still = [
         one.name
-        for one, there, driven in zip(torques.joints, np.mean(torques.moving, axis=1), torques.driven, strict=True)
+        for one, there, driven in zip(
+            torques.joints, np.mean(torques.moving[: len(torques.joints)], axis=1), torques.driven, strict=True
+        )
         if driven and there < _MOVES
     ]
     if still:

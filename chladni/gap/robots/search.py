@@ -1,5 +1,6 @@
 """The search for what a robot's description lacks: terms are added, exchanged and dropped while that pays."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 from chladni.gap.robots.contest import Contest, Fit
@@ -53,7 +54,7 @@ def _beside(contest: Contest, one: Fit) -> list[Fit]:
 
 def _shared(others: Sequence[Term]) -> Iterable[list[Term]]:
     """Words at all joints that lack them."""
-    alone = [term for term in others if len(term.rows) == 1]
+    alone = [term for term in others if term.rows and not term.is_coupling]
     for kind in dict.fromkeys(term.kind for term in alone):
         yield [term for term in alone if term.kind == kind]
 
@@ -62,10 +63,21 @@ def _tidied(contest: Contest, best: Fit) -> Fit:
     """Drop terms, and exchange each for another where it acts, while that helps."""
     while True:
         found = [one for place in range(len(best.terms)) for one in alternatives(contest, best, place, _EXCHANGED)]
-        better = _best([best, *found])
+        better = _best([best, *found, *_merged(contest, best)])
         if better is best:
             return best
         best = better
+
+
+def _merged(contest: Contest, best: Fit) -> list[Fit]:
+    """Fit one term in place of all that stand at a site: two idealisations may be one other law."""
+    found = []
+    for site, count in Counter(term.site for term in best.terms).items():
+        if count > 1:
+            rest = contest.fit([term for term in best.terms if term.site != site], best)
+            near = [term for _, term in contest.promise(rest) if term.site == site]
+            found += [contest.fit([*rest.terms, term], rest) for term in near[:_EXCHANGED]]
+    return found
 
 
 def alternatives(contest: Contest, best: Fit, place: int, count: int) -> list[Fit]:

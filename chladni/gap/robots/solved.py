@@ -1,14 +1,17 @@
 """What a robot's description lacks, found on one log: terms, delays, and the torques that they were found in."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
+from chladni.gap.calibration import SAME
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forms import refined
+from chladni.gap.robots.pushes import Push, price, pushed, pushes_of
 from chladni.gap.robots.search import searched
-from chladni.gap.robots.term import Term
+from chladni.gap.robots.term import SENSES, Term
 from chladni.gap.robots.told import TOLD, Numbers
 from chladni.gap.robots.torques import ALL_COMMANDS, FormKey, Torques
 from chladni.signals.arrays import Real
@@ -17,7 +20,6 @@ from chladni.signals.arrays import Real
 _SHIFTS, _SETTLED_S, _SETTLED_M = 5, 1e-4, 2e-3
 #: Deviations of its mass from which a payload has a place.
 _TOLD_BY = 2.0
-_PAIR = 2
 #: Of a form: by how little it moves when it has settled.
 _SETTLED = 0.01
 
@@ -34,11 +36,14 @@ class Solved:
         Its most probable set.
     spread
         Standard deviations of the forms of laws, by word, site and variant.
+    pushes
+        What pushed for a while; those stretches took no part.
     """
 
     contest: Contest
     best: Fit
     spread: Mapping[FormKey, float] = field(default_factory=dict)
+    pushes: tuple[Push, ...] = ()
 
     @property
     def torques(self) -> Torques:
@@ -57,8 +62,8 @@ class Solved:
                 number.name: (float(value * gain), float(deviation * gain), number.unit)
                 for number, value, deviation in zip(term.numbers, values, deviations, strict=True)
             }
-            if len(term.rows) == _PAIR:
-                found = {"sense": (1.0 if term.variant == "sum" else -1.0, 0.0, "1"), **found}
+            if term.is_coupling:
+                found = {"sense": (SENSES[str(term.variant)], 0.0, "1"), **found}
         if term.form is not None:
             spread = self.spread.get((term.word, term.site, term.variant), np.inf)
             found[term.form.name] = (term.form.value, float(spread), term.form.unit)
@@ -81,15 +86,27 @@ def solved(torques: Torques, left_out: frozenset[str], progress: Callable[[float
     left_out
         Words that don't take part.
     """
-    contest = Contest(torques, left_out)
+    found = _settled(Contest(torques, left_out), left_out, progress)
+    for fit in (found.best, found.contest.nothing):
+        away = pushed(found.contest, fit)
+        if not away:
+            continue
+        # What pushes for a while would be taken for laws of its joints.
+        other = _settled(Contest(found.torques.without(away), left_out), left_out, progress)
+        if other.best.nats - price(found.contest, away) > found.best.nats:
+            return replace(other, pushes=pushes_of(other.contest, other.best))
+    return found
+
+
+def _settled(contest: Contest, left_out: frozenset[str], progress: Callable[[float], None]) -> Solved:
     best = searched(contest, progress=progress)
     spread: dict[FormKey, float] = {}
     for _ in range(_SHIFTS):
-        late, centres = _guesses(torques, best)
+        late, centres = _guesses(contest.torques, best)
         forms, spread = refined(contest, best)
-        leveled = contest.torques.with_level(np.array([one.over_noise for one in best.left]))
+        leveled = contest.torques.with_level(contest.quietest(best))
         guessed = leveled.with_guesses(late, centres, forms, contest.explained(best))
-        if contest.torques.level is not None and _is_settled(contest.torques, guessed):
+        if _is_settled(contest.torques, guessed):
             break
         contest = Contest(guessed, left_out)
         best = searched(contest, contest.again(best), progress=progress)
@@ -109,15 +126,15 @@ def _guesses(torques: Torques, fit: Fit) -> tuple[dict[str, float], dict[str, Re
 
 
 def _is_settled(before: Torques, after: Torques) -> bool:
-    for old, new, close in (
+    if before.level is None or after.level is None:
+        return False
+    guesses: tuple[tuple[Mapping[Any, Any], Mapping[Any, Any], float], ...] = (
         (before.late_s, after.late_s, _SETTLED_S),
         (before.centre_m, after.centre_m, _SETTLED_M),
-        (before.forms, after.forms, None),
-    ):
-        if old.keys() != new.keys():
-            return False
-        for key, value in new.items():
-            allowed = _SETTLED * float(np.max(np.abs(value))) if close is None else close
-            if float(np.max(np.abs(value - old[key]))) > allowed:
-                return False
-    return True
+        ({key: np.log(abs(one)) for key, one in before.forms.items()},
+         {key: np.log(abs(one)) for key, one in after.forms.items()}, _SETTLED),
+    )  # fmt: skip
+    return np.all(np.abs(np.log(after.level / before.level)) < np.log(SAME)) and all(
+        old.keys() == new.keys() and all(np.max(np.abs(new[key] - old[key])) < close for key in new)
+        for old, new, close in guesses
+    )

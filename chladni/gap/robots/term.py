@@ -11,6 +11,8 @@ from chladni.signals.arrays import Real
 
 #: Place of a form that was found, beside those of the grid that it's searched on.
 FOUND = -1
+#: Variants of laws between two joints: of the sum or the difference of their speeds.
+SENSES = {"sum": 1.0, "difference": -1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,13 +81,15 @@ class Term:
     word, site, variant
         What, where, and which kind of it.
     columns
-        ``[number, joint, coarse]``: missing torque a unit of each number.
+        ``[number, row, coarse]``: missing torque a unit of each number; rows of the loops may be left out.
     numbers
         One a column.
     rows
         Of the joints whose law this idealises; none where the physics is exact.
     form
         The number that its columns aren't linear in, if there's one.
+    reach
+        How far the other numbers, as a vector, can lie from the first as its arm: a mass and its first moment.
     """
 
     word: str
@@ -95,11 +99,17 @@ class Term:
     rows: tuple[int, ...] = ()
     variant: str | None = None
     form: Form | None = None
+    reach: float | None = None
 
     @property
     def key(self) -> tuple[str, str]:
         """Word and site."""
         return self.word, self.site
+
+    @property
+    def is_coupling(self) -> bool:
+        """Whether it acts between two joints."""
+        return self.variant in SENSES
 
     @property
     def kind(self) -> tuple[str, str | None, int]:
@@ -133,10 +143,9 @@ class Term:
 
 
 def formed(
-    make: Callable[[float], Term], grid: Real, *, name: str, unit: str, found: float | None = None,
-    count: int | None = None,
-) -> list[Term]:  # fmt: skip
-    """Give the terms of a law at the values of a form on a growing grid, and at the one that was found."""
+    make: Callable[[float], Term], grid: Real, *, name: str, unit: str, count: int | None = None
+) -> list[Term]:
+    """Give the terms of a law at the values of a form on a growing grid."""
     step = np.diff(grid)
     # Before the first and behind the last as far as to the next; a form that is positive stays so.
     before = grid[0] - step[0] if grid[0] <= 0 or grid[0] > step[0] else 0.1 * grid[0]
@@ -146,15 +155,11 @@ def formed(
              count=count or grid.size, make=make)
         for place, value in enumerate(grid.tolist())
     ]  # fmt: skip
-    terms = [one.term() for one in forms]
-    if found is not None:
-        near = forms[int(np.argmin(np.abs(grid - found)))]
-        terms.append(replace(near, low=min(near.low, found), high=max(near.high, found)).at(found))
-    return terms
+    return [one.term() for one in forms]
 
 
 def at_row(torques: Torques, row: int, *columns: Real) -> Real:
-    """Give ``[number, joint, coarse]`` of columns of one joint."""
+    """Give ``[number, row, coarse]`` of columns of one row."""
     found = np.zeros((len(columns), *torques.missing.shape))
     found[:, row] = columns
     return found

@@ -58,10 +58,10 @@ def _between(term: Term, values: Real, deviations: Real) -> Numbers:
     told = {
         name: (float(values[place]), float(deviations[place]), term.numbers[place].unit)
         for name, place in by_name.items()
-        if name != "both"
+        if name not in ("both", "part")
     }
     first = "gap" if term.word == "backlash" else "compliance"
-    if first not in told:
+    if first not in told and term.form is None:
         # The log tells the product with the rotor's inertia.
         both, rotor = (float(values[by_name[name]]) for name in ("both", "inertia"))
         spread = float(deviations[by_name["both"]])

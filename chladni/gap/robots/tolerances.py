@@ -18,28 +18,33 @@ def tolerances(torques: Torques) -> tuple[Real, list[str]]:
     """Give columns ``[number, joint, coarse]``, of a standard deviation each, and names of what tolerances allow."""
     tolerance = torques.robot.tolerance
     found = list(_of_links(torques))
+    served = (torques.two_sided or not torques.by_effort) and torques.log.command_kind == "position"
     for row, joint in torques.rows:
         if joint.armature > 0:
             own = joint.armature * torques.acceleration[row]
             found.append((f"{joint.name}.armature", tolerance.inertia * at_row(torques, row, own)[0]))
         if tolerance.friction > 0:
             found.append((f"{joint.name}.friction", tolerance.friction * at_row(torques, row, torques.sign[row])[0]))
-        if tolerance.gains > 0 and not torques.by_effort and torques.log.command_kind == "position":
+        if tolerance.gains > 0 and served:
             damped = torques.kd[row] * torques.velocity[row]
-            both = at_row(torques, row, torques.wanted[row] + damped, damped) * tolerance.gains
+            both = at_row(torques, torques.servo_row(row), torques.answered[row] + damped, damped) * tolerance.gains
             found += zip((f"{joint.name}.kp", f"{joint.name}.kd"), both, strict=True)
-    if not torques.by_effort and torques.log.command_kind == "position":
+    if served:
         # A digital servo holds what it reads for a period.
-        found.append(("loop", -LOOP_S * torques.loop))
+        found.append(("loop", -LOOP_S * torques.at_servos(torques.loop)))
     if torques.by_effort and torques.log.command is not None and torques.log.command_kind == "position":
         # Efforts are sampled while commands are held: always just after a step, or just before it.
-        between = torques.smooth(np.nan_to_num(torques.command() - torques.log.command))
+        half_s = 0.5 / torques.log.sample_rate_hz
+        between = torques.smooth(np.nan_to_num(torques.mean_command(0.0, half_s) - torques.log.command))
         for row, joint in torques.rows:
             stiffness = torques.kp[row] or usual(torques, row) / rms(
                 torques.position[row] - np.mean(torques.position[row])
             )
-            found.append((f"{joint.name}.hold", at_row(torques, row, stiffness * between[row])[0]))
-    columns = np.array([column for _, column in found]).reshape(-1, *torques.missing.shape)
+            for there in dict.fromkeys([row, torques.servo_row(row)]):
+                found.append((f"{torques.name_of(there)}.hold", at_row(torques, there, stiffness * between[row])[0]))
+    columns = np.zeros((len(found), *torques.missing.shape))
+    for place, (_, column) in enumerate(found):
+        columns[place, : len(column)] = column
     return columns, [name for name, _ in found]
 
 

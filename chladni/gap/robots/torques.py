@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from scipy.ndimage import correlate1d
@@ -38,6 +38,8 @@ _ORDER = 4
 _LINES, _CLEAR = 64, 0.02
 #: By how much a joint is turned to tell what that changes, rad (m), RMS.
 _TURN = 1e-4
+#: A stamp that is just reached counts.
+_TIE_S = 1e-7
 ALL_COMMANDS = "all commands"
 #: Share of rest within the filter's length up to which a sample counts as moving.
 _MIXED = 0.5
@@ -64,11 +66,15 @@ class Torques:
     forms
         Numbers of laws that were found between those of their grids.
     explained
-        ``[joint, coarse]``: missing torque that was explained already; nothing when None.
+        ``[row, coarse]``: missing torque that was explained already; nothing when None.
     level
-        ``[joint]``: share of the highest noise's power that the noise has; all of it when None.
+        ``[row]``: share of the highest noise's power that the noise has; all of it when None.
     cutoff_hz
         Of the filter, whose phase is zero.
+    away
+        Stretches that don't count, s from the log's start.
+    memory
+        Of what stays as it is whatever is guessed.
     """
 
     robot: Robot
@@ -79,6 +85,8 @@ class Torques:
     forms: Mapping[FormKey, float] = field(default_factory=dict)
     explained: Real | None = None
     level: Real | None = None
+    away: tuple[tuple[float, float], ...] = ()
+    memory: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def joints(self) -> tuple[RobotJoint, ...]:
@@ -137,9 +145,9 @@ class Torques:
             noise = np.cumsum(gain * self._steps[1][row]) * frequency_hz[0]
             clear = np.searchsorted(noise, (_CLEAR * np.std(own)) ** 2)
             cutoff_hz = frequency_hz[min(clear, len(frequency_hz) - 1)]
-            sections = butter(_ORDER, cutoff_hz, fs=self.rate_hz, output="sos")
+            sections = _sections(float(cutoff_hz), self.rate_hz)
             for a, b in self._coarse:
-                rate = np.gradient(self.wanted[row, a:b], 1.0 / self.rate_hz)
+                rate = np.gradient(self.answered[row, a:b], 1.0 / self.rate_hz)
                 found[row, a:b] = sosfiltfilt(sections, own[a:b] - rate)
         return found
 
@@ -151,7 +159,7 @@ class Torques:
 
     def _filtered(self, values: Real, cutoff_hz: float) -> Real:
         found = np.array(values, dtype=np.float64)
-        sections = butter(_ORDER, cutoff_hz, fs=self.log.sample_rate_hz, output="sos")
+        sections = _sections(cutoff_hz, self.log.sample_rate_hz)
         for a, b in self.stretches:
             found[..., a:b] = sosfiltfilt(sections, found[..., a:b], axis=-1)
         return found
@@ -255,20 +263,39 @@ class Torques:
         return (self.of_joints(motion_torque(self.robot, *moved)) - self.of_joints(self.need.torque)) / step
 
     def command(self, later_s: float = 0.0) -> Real:
-        """``[joint, sample]`` of the log's grid: the command as it arrives, and later still; NaN without any."""
-        log = self.log
-        if log.command is None or log.command_messages is None:
-            raise LogError(f"{log.log}: holds no command; record the commands of the drives, or their efforts")
-        half, found = 0.5 / log.sample_rate_hz, np.full_like(log.command, np.nan)
-        for row, (starts, values) in enumerate(log.command_messages):
-            if not starts.size:
-                continue
-            # What a smooth signal does about a sample: the held command's mean over one interval around it.
+        """``[joint, sample]`` of the log's grid: the command as it arrives, and later still; NaN without any.
+
+        A motion answers to its mean over the sample's interval, an effort to what is held when it's sampled.
+        """
+        half = 0.5 / self.log.sample_rate_hz
+        return self._held(later_s) if self.two_sided else self.mean_command(later_s, half)
+
+    def mean_command(self, later_s: float, half_s: float) -> Real:
+        """Give ``[joint, sample]``: the held command's mean over an interval around each sample."""
+        found = np.full_like(self._commands, np.nan)
+        for row, (starts, values) in self._messages():
             sums = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(starts))])
-            at = log.time_s - self.robot.delay_s - later_s
-            before, after = (_integral(at + side, starts, values, sums) for side in (-half, half))
-            found[row] = (after - before) / (2.0 * half)
+            at = self.log.time_s - self.robot.delay_s - later_s
+            before, after = (_integral(at + side, starts, values, sums) for side in (-half_s, half_s))
+            found[row] = (after - before) / (2.0 * half_s)
         return found
+
+    def _held(self, later_s: float) -> Real:
+        found = np.full_like(self._commands, np.nan)
+        at = self.log.time_s - self.robot.delay_s - later_s + _TIE_S
+        for row, (starts, values) in self._messages():
+            found[row] = values[np.maximum(np.searchsorted(starts, at, "right") - 1, 0)]
+        return found
+
+    @property
+    def _commands(self) -> Real:
+        if self.log.command is None or self.log.command_messages is None:
+            raise LogError(f"{self.log.log}: holds no command; record the commands of the drives, or their efforts")
+        return self.log.command
+
+    def _messages(self) -> list[tuple[int, tuple[Real, Real]]]:
+        """Rows with commands, and their messages."""
+        return [(row, each) for row, each in enumerate(self.log.command_messages or ()) if each[0].size]
 
     @cached_property
     def error(self) -> Real:
@@ -282,8 +309,35 @@ class Torques:
 
     @cached_property
     def by_effort(self) -> bool:
-        """Whether the log tells what the drives gave."""
-        return self.log.effort is not None and self.log.effort_kind in ("measured", "current")
+        """Whether the log tells what the drives gave, or what they were asked for."""
+        return self.log.effort is not None and self.log.effort_kind in ("measured", "current", "commanded")
+
+    @cached_property
+    def two_sided(self) -> bool:
+        """Whether the log tells commands, efforts and motion: the loops are looked at apart from what they move."""
+        servos = self.log.command is not None and self.log.command_kind == "position"
+        return self.by_effort and servos and bool(np.all(np.isfinite(self.by_row("kp"))))
+
+    @cached_property
+    def gives(self) -> bool:
+        """Whether efforts are what arrives at the joints, so that drives are told by what they were asked for."""
+        return self.two_sided and self.log.effort_kind == "measured"
+
+    def servo_row(self, row: int) -> int:
+        """Row at which what a joint's loop does otherwise shows."""
+        return row + len(self.joints) * self.two_sided
+
+    def at_servos(self, values: Real) -> Real:
+        """Give ``[row, coarse]`` of ``[joint, coarse]`` that acts at the loops."""
+        return np.concatenate([np.zeros_like(values), values]) if self.two_sided else values
+
+    def name_of(self, row: int) -> str:
+        """What stands at a row."""
+        return (
+            self.joints[row].name
+            if row < len(self.joints)
+            else f"the drive of {self.joints[row % len(self.joints)].name}"
+        )
 
     @cached_property
     def kp(self) -> Real:
@@ -310,20 +364,57 @@ class Torques:
         """``[joint, sample]``: torque of the drives, before their limits."""
         if self.by_effort and self.log.effort is not None:
             return self.log.effort
-        kp, kd = self.by_row("kp")[:, None], self.kd[:, None]
         if self.log.command_kind == "effort":
             return self.command()
         if self.log.command_kind == "velocity":
             return self.by_row("kd")[:, None] * (self.command() - self.fast_velocity)
-        return kp * self.error - kd * self.fast_velocity
+        return self._served
+
+    @property
+    def _served(self) -> Real:
+        """``[joint, sample]``: torque that position loops ask for, before their limits."""
+        return self.by_row("kp")[:, None] * self.error - self.kd[:, None] * self.loop_velocity
+
+    @cached_property
+    def loop_velocity(self) -> Real:
+        """``[joint, sample]``: what the loops damp: of efforts at their instant, as the log reads it if that fits.
+
+        Between held commands a joint trembles, which no difference of samples tells.
+        """
+        read = self.log.velocity
+        if not self.two_sided or read is None:
+            return self.fast_velocity
+        pull = self.kp[:, None] * (self._held(0.0) - self.log.position) - self.fast_drive
+        inside = np.zeros(read.shape[1], dtype=bool)
+        inside[self.kept] = True
+        left = [np.std((pull - self.kd[:, None] * one)[:, inside], axis=1) for one in (read, self.fast_velocity)]
+        return np.where((left[0] < left[1])[:, None], read, self.fast_velocity)
 
     @cached_property
     def fast_drive(self) -> Real:
         """``[joint, sample]``: torque of the drives."""
+        known = np.where(self.driven[:, None], self.unlimited, 0.0)
+        return known if self.by_effort else self._limited(known)
+
+    def _limited(self, torque: Real) -> Real:
         limit = self.by_row("limit")[:, None]
         bound = np.where(np.isfinite(limit), limit, np.inf)
-        known = np.where(self.driven[:, None], self.unlimited, 0.0)
-        return known if self.by_effort else np.clip(known, -bound, bound)
+        return np.clip(torque, -bound, bound)
+
+    @cached_property
+    def fast_asked(self) -> Real:
+        """``[joint, sample]``: torque that the drives are asked for."""
+        return self._limited(np.nan_to_num(self._served)) if self.gives else self.fast_drive
+
+    @cached_property
+    def asked(self) -> Real:
+        """``[joint, coarse]``: torque that the loops ask for; the drives' where the log has no efforts beside them."""
+        return self.smooth(self._limited(np.nan_to_num(self._served))) if self.two_sided else self.drive
+
+    @cached_property
+    def answered(self) -> Real:
+        """``[joint, coarse]``: what the loops' torque is held against."""
+        return self.drive if self.two_sided else self.wanted
 
     @cached_property
     def drive(self) -> Real:
@@ -353,8 +444,12 @@ class Torques:
 
     @cached_property
     def missing(self) -> Real:
-        """``[joint, coarse]``: what the drives gave beyond what the motion and the described friction needed."""
-        return self.drive - self.wanted
+        """``[row, coarse]``: what the drives gave beyond what the motion and the described friction needed.
+
+        Where the log tells commands and efforts, further rows, one a joint, hold what the loops asked for beyond that.
+        """
+        lacks = self.drive - self.wanted
+        return np.concatenate([lacks, self.asked - self.drive]) if self.two_sided else lacks
 
     @cached_property
     def _steps(self) -> tuple[Real, Real]:
@@ -362,12 +457,8 @@ class Torques:
 
     @cached_property
     def rest(self) -> Real:
-        """``[joint, coarse]``: what is missing beyond what was explained already."""
+        """``[row, coarse]``: what is missing beyond what was explained already."""
         return self.missing if self.explained is None else self.missing - self.explained
-
-    def found(self, key: FormKey) -> float | None:
-        """Give the number of a law that was found between those of its grid."""
-        return self.forms.get(key)
 
     @property
     def resolution(self) -> Real:
@@ -389,29 +480,38 @@ class Torques:
 
     @cached_property
     def sensed_noise(self) -> Real:
-        """``[joint]``: standard deviation that the noise of sensors gives the missing torque."""
+        """``[row]``: standard deviation that the noise of sensors gives the missing torque."""
         inertia = self.need.inertia[[one.dof for one in self.joints]]
         damping = np.array([one.damping for one in self.joints])
         by_position = not self.by_effort and self.log.command_kind == "position"
         kp, kd = (one * by_position for one in (self.kp, self.kd))
         found = torque_noise(self._steps[1], self.cutoff_hz, stiffness=kp, damping=kd + damping, inertia=inertia)
-        if self.by_effort:
-            found += steps_and_noise(self.fast_drive, self.log.sample_rate_hz, self.stretches)[1] * self.cutoff_hz
-        return np.sqrt(found)
+        if not self.by_effort:
+            return np.sqrt(found)
+        rate, stretches = self.log.sample_rate_hz, self.stretches
+        effort = steps_and_noise(self.fast_drive, rate, stretches)[1] * self.cutoff_hz
+        if not self.two_sided:
+            return np.sqrt(found + effort)
+        # Efforts step with their commands, which is no noise: what loops ask for does so, too.
+        differs = self.kp[:, None] * (self._held(0.0) - self.log.position) - self.kd[:, None] * self.loop_velocity
+        loops = steps_and_noise(np.nan_to_num(differs) - self.fast_drive, rate, stretches)[1] * self.cutoff_hz
+        return np.sqrt(np.concatenate([found + np.minimum(effort, loops), loops]))
 
     @cached_property
     def highest_noise(self) -> Real:
-        """``[joint]``: the same with what a rigid description rounds."""
+        """``[row]``: the same with what a rigid description rounds."""
         usual = np.mean(self.of_joints(self.need.torque) ** 2 + self.drive**2, axis=1) / 2.0
+        if self.two_sided:
+            usual = np.concatenate([usual, np.mean(self.drive**2, axis=1)])
         return np.asarray(np.sqrt(self.sensed_noise**2 + _RIGHT**2 * usual) + 1e-12)
 
     @property
     def noise(self) -> Real:
-        """``[joint]``: standard deviation of the missing torque where nothing is missing."""
+        """``[row]``: standard deviation of the missing torque where nothing is missing."""
         return self.highest_noise * np.sqrt(1.0 if self.level is None else self.level)
 
     def with_level(self, over_noise: Real) -> Self:
-        """Give the same with noise as low as a fit says by what it leaves, but no lower than the sensors'."""
+        """Give the same with noise as low as fits say by what they leave, but no lower than the sensors'."""
         other = copy(self)
         least = (self.sensed_noise / self.highest_noise) ** 2
         level = np.ones_like(least) if self.level is None else self.level
@@ -420,10 +520,25 @@ class Torques:
 
     @cached_property
     def moving(self) -> Mask:
-        """``[joint, coarse]``: where a joint isn't stuck: then friction is anything between its two values."""
+        """``[row, coarse]``: where a joint isn't stuck: then friction is anything between its two values."""
         rests = np.abs(self.fast_velocity) < self.slow[:, None]
         # Whatever the filter mixes in.
-        return (self.smooth(rests.astype(np.float64)) < _MIXED) & self.driven[:, None]
+        moving = (self.smooth(rests.astype(np.float64)) < _MIXED) & self.driven[:, None]
+        times = self.log.time_s[self.kept]
+        for start_s, end_s in self.away:
+            moving[:, (times >= start_s) & (times <= end_s)] = False
+        if not self.two_sided:
+            return moving
+        # A loop asks for its torque whether its joint moves or not.
+        served = np.all(np.isfinite(self._served), axis=1) & self.driven
+        return np.concatenate([moving, np.broadcast_to(served[:, None], moving.shape)])
+
+    def without(self, away: tuple[tuple[float, float], ...]) -> Self:
+        """Give the same without some stretches."""
+        other = copy(self)
+        object.__setattr__(other, "away", away)
+        vars(other).pop("moving", None)
+        return other
 
     def with_guesses(
         self,
@@ -450,6 +565,11 @@ class Torques:
         # Where nobody commands a joint nothing comes late.
         earlier = np.nan_to_num(self.command(first) - self.command(last))
         return self.kp[:, None] * self.smooth(earlier) / (last - first)
+
+
+@lru_cache
+def _sections(cutoff_hz: float, rate_hz: float) -> Real:
+    return np.asarray(butter(_ORDER, cutoff_hz, fs=rate_hz, output="sos"))
 
 
 def rms(values: Real) -> float:

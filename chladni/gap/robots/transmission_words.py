@@ -8,57 +8,95 @@ Dynamic Systems, Measurement, and Control 109 (1987) 310).
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from chladni.gap.robots.term import Number, Term, at_row, length, usual
+from chladni.gap.robots.term import Number, Term, at_row, formed, length, usual
 from chladni.gap.robots.torques import Torques, rms
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
 
 #: Of the pose's error under the usual torque of a spring, and of play, before a log is seen: rad (m).
 _GIVES = 0.02
+#: Quantiles of the angle by which a loop is pulled aside at which play is tried.
+_PLAYS = (0.3, 0.5, 0.75)
 AT_LINK, AT_MOTOR = "encoder at the link", "encoder at the motor"
 
 
 def transmissions(torques: Torques) -> Iterator[Term]:
     """Springs and play between motors and links."""
     for row, joint in torques.rows:
-        often = usual(torques, row)
-        torque = torques.wanted[row]
-        soft = Number(name="compliance", unit=_over(joint), scale=_GIVES / often, least=0.0)
-        yield from _between(torques, row, joint, "joint_elasticity", torque, soft)
-        if np.any(np.diff(np.sign(torque))):
-            play = Number(name="gap", unit=length(joint), scale=_GIVES, least=0.0)
-            yield from _between(torques, row, joint, "backlash", _side(torques, row), play)
+        soft = Number(name="compliance", unit=_over(joint), scale=_GIVES / usual(torques, row), least=0.0)
+        yield from _between(torques, row, joint, "joint_elasticity", torques.wanted[row], soft)
+        drive = torques.fast_drive[row]
+        if not (drive.min() < 0.0 < drive.max()):
+            continue
+        play = Number(name="gap", unit=length(joint), scale=_GIVES, least=0.0)
+        side = torques.smooth(0.5 * np.tanh(drive / (2.0 * torques.highest_noise[row])))
+        known = _loop_is_known(torques, row)
+        for term in _between(torques, row, joint, "backlash", side, play):
+            if term.variant == AT_MOTOR or not known:
+                yield term
+        if known:
+            yield from _play(torques, row, joint)
+
+
+def _loop_is_known(torques: Torques, row: int) -> bool:
+    return (torques.two_sided or not torques.by_effort) and bool(torques.kp[row] > 0)
 
 
 def _over(joint: RobotJoint) -> str:
     return "rad/(N m)" if joint.kind == "hinge" else "m/N"
 
 
+def _rotor(torques: Torques, row: int, joint: RobotJoint) -> Number:
+    scale = usual(torques, row) / rms(torques.acceleration[row])
+    return Number(name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", scale=scale, least=0.0)
+
+
 def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Real, number: Number) -> Iterator[Term]:
     """Give the law for either side that the log may read; `ahead` is the motor's lead a unit of the number."""
     rate, acceleration = torques.coarse_rate(ahead), torques.coarse_rate(torques.coarse_rate(ahead))
-    scale = usual(torques, row) / rms(torques.acceleration[row])
-    rotor = Number(name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", scale=scale, least=0.0)
-    both = Number(name="both", unit="1", scale=number.scale * scale, least=0.0)
-    if torques.by_effort:
-        columns = (acceleration, torques.acceleration[row])
-        numbers: tuple[Number, ...] = (both, rotor)
-    else:
-        columns = (torques.kp[row] * ahead + torques.kd[row] * rate, torques.acceleration[row], acceleration)
-        numbers = (number, rotor, both)
-    yield Term(
-        word=word, site=joint.name, columns=at_row(torques, row, *columns), numbers=numbers, rows=(row,),
-        variant=AT_LINK,
-    )  # fmt: skip
+    rotor = _rotor(torques, row, joint)
+    both = Number(name="both", unit="1", scale=number.scale * rotor.scale, least=0.0)
+    columns, numbers = at_row(torques, row, torques.acceleration[row], acceleration), (rotor, both)
+    rows = tuple(dict.fromkeys([row, torques.servo_row(row)]))
+    if _loop_is_known(torques, row):
+        # The loop works on the motor's angle.
+        loop = torques.kp[row] * ahead + torques.kd[row] * rate
+        columns = np.concatenate([at_row(torques, torques.servo_row(row), loop), columns])
+        numbers = (number, *numbers)
+    yield Term(word=word, site=joint.name, columns=columns, numbers=numbers, rows=rows, variant=AT_LINK)
     behind = torques.turned(row, -ahead, -rate, -acceleration)
-    whole = np.concatenate([-behind[None], at_row(torques, row, torques.acceleration[row])])
+    whole = np.concatenate([-behind[None], at_row(torques, row, torques.acceleration[row])[:, : len(behind)]])
     yield Term(word=word, site=joint.name, columns=whole, numbers=(number, rotor), rows=(row,), variant=AT_MOTOR)
 
 
-def _side(torques: Torques, row: int) -> Real:
-    """Half a unit of play, to the side on which the motor presses."""
-    time_s = torques.log.time_s
-    fast = CubicSpline(time_s[torques.kept], torques.wanted[row])(time_s)
-    return torques.smooth(0.5 * np.tanh(fast / (2.0 * torques.highest_noise[row])))
+def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
+    """Play before a link that the log reads: inside it nothing holds the motor, which follows its loop."""
+    asked, kp, kd = torques.fast_asked[row], float(torques.kp[row]), float(torques.kd[row])
+    step_s = 1.0 / torques.log.sample_rate_hz
+    part = Number(name="part", unit="1", scale=1.0, least=0.5)
+    rows = tuple(dict.fromkeys([row, torques.servo_row(row)]))
+    rotor = _rotor(torques, row, joint)
+
+    def make(gap: float) -> Term:
+        ahead = _inside(asked, 0.5 * gap, kp, kd, step_s)
+        pulled = torques.smooth(kp * ahead + kd * np.gradient(ahead, step_s))
+        turning = torques.acceleration[row] + torques.coarse_rate(torques.coarse_rate(torques.smooth(ahead)))
+        columns = np.concatenate([at_row(torques, torques.servo_row(row), pulled), at_row(torques, row, turning)])
+        return Term(
+            word="backlash", site=joint.name, columns=columns, numbers=(part, rotor), rows=rows, variant=AT_LINK
+        )
+
+    grid = 2.0 * np.quantile(np.abs(asked), _PLAYS) / kp
+    if grid[0] > 0 and np.all(np.diff(grid) > 0):
+        yield from formed(make, grid, name="gap", unit=length(joint))
+
+
+def _inside(asked: Real, half: float, kp: float, kd: float, step_s: float) -> Real:
+    """Give a motor's lead inside its play: ``kp u + kd du/dt`` is what its loop asks for, up to either side."""
+    share = step_s / (kd + step_s * kp)
+    path, lead = [], 0.0
+    for each in asked.tolist():
+        lead = min(max(lead + share * (each - kp * lead), -half), half)
+        path.append(lead)
+    return np.array(path)
