@@ -152,8 +152,8 @@ class _Reader:
             self._measured(name, self._laid(measured, rows.get(name, {}), series.samples), position)
             for name in ("velocity", "effort")
         )
-        if effort is not None and command is not None:
-            self._tell_same_effort(state, command)
+        if effort is not None and command is not None and self._is_same_effort(state, command):
+            effort = None
         held = None if kind is None else self._laid(read.commands, commanded, series.samples)
         kept = self._kept(position, velocity, effort, held, series.sample_rate_hz)
 
@@ -292,22 +292,26 @@ class _Reader:
             return None
         return self._in_newton_metres(values) if name == "effort" else values
 
-    def _tell_same_effort(self, state: JointTopic, command: JointTopic) -> None:
-        """Say when states and commands hold the same efforts: then one of them is a copy."""
+    def _is_same_effort(self, state: JointTopic, command: JointTopic) -> bool:
+        """Whether states hold a copy of the commands' efforts, which is no measurement where nobody says what it is."""
+        if self._robot.log.effort is not None:
+            return False
         fields = [one.fields().get("effort", "") for one in (state, command)]
         both = [one.paths(field, self._joints[:1]) for one, field in zip((state, command), fields, strict=True)]
         paths = [path for own in both for path in own.values()]
         if len(paths) < 2:
-            return
+            return False
         try:
             measured, commanded = self._log.stamped(paths, start_s=self._start_s, end_s=self._end_s)
         except LogError:
-            return
-        if np.array_equal(measured.values, commanded.values, equal_nan=True):
+            return False
+        same = np.array_equal(measured.values, commanded.values, equal_nan=True)
+        if same:
             self._remarks.append(
-                f"{visible(state.label)} and {visible(command.label)} hold the same efforts: one is a copy; effort "
-                "in [log] of a robot file says what they are"
+                f"{visible(state.label)} and {visible(command.label)} hold the same efforts: they count as absent, "
+                "unless effort in [log] of a robot file says what they are"
             )
+        return same
 
     def _in_newton_metres(self, values: Real) -> Real | None:
         """Give efforts, of currents by the robot file's constants."""

@@ -71,23 +71,39 @@ class Answer:
         found = [_weighed(self.solved, place) for place in range(len(self._best.terms))]
         return tuple(sorted(found, key=lambda one: (-one.probability, -one.share)))
 
-    @cached_property
+    @property
     def named(self) -> tuple["Weighed", ...]:
-        """Those that torques name, where a simulation with them doesn't deny it."""
-        return () if self.denied is not None else self._suggested
+        """Those that torques name, without what a simulation denies."""
+        return self._confirmed[0]
 
-    @cached_property
-    def _simulated(self) -> Confirmed | None:
-        """What simulation says of the names that torques suggest; None where it can't be run, or runs go astray."""
-        best = self._contest.fit([one.term for one in self._suggested])
-        found = confirmed(Solved(contest=self._contest, best=best))
-        return found if found is not None and np.all(np.isfinite([found.before, found.tuned, found.after])) else None
-
-    @cached_property
+    @property
     def denied(self) -> Confirmed | None:
-        """The same, when it's no better with the names than without."""
-        found = self._simulated if self._suggested else None
-        return found if found is not None and (found.after > found.tuned or found.after > 1.0) else None
+        """What simulation says of the names that torques suggest, when it's better without them all."""
+        return self._confirmed[1] if self._suggested and not self.named else None
+
+    @property
+    def _simulated(self) -> Confirmed | None:
+        """What simulation says of the names; None where it can't be run, or runs go astray."""
+        return self._confirmed[1]
+
+    @cached_property
+    def _confirmed(self) -> tuple[tuple["Weighed", ...], Confirmed | None]:
+        """The names with which positions are simulated no worse than without, and that simulation.
+
+        What acts where the error grew most goes first, the least probable before others.
+        """
+        named, first = self._suggested, None
+        while True:
+            best = self._contest.fit([one.term for one in named])
+            found = confirmed(Solved(contest=self._contest, best=best))
+            if found is None or not np.all(np.isfinite([found.before, found.tuned, found.after])):
+                return named, None
+            first = first or found
+            if not named:
+                return (), first
+            if not found.denies:
+                return named, found
+            named = _without_worst(named, found, self.solved.torques)
 
     @cached_property
     def _suggested(self) -> tuple["Weighed", ...]:
@@ -140,6 +156,13 @@ class Answer:
             answer_set=tuple(dict.fromkeys(each for one in self.weighed for each in (one.candidate, *one.others))),
             coverage=COVERAGE,
         )
+
+
+def _without_worst(named: tuple["Weighed", ...], found: Confirmed, torques: Torques) -> tuple["Weighed", ...]:
+    grew = found.per_joint_after**2 - found.per_joint_tuned**2
+    worst = int(np.nanargmax(np.where(np.isfinite(grew), grew, np.nan)))
+    there = [one for one in named if worst in {row % len(torques.joints) for row in one.acts}] or list(named)
+    return tuple(one for one in named if one is not there[-1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -230,6 +253,8 @@ def _is_told(best: Fit, place: int) -> bool:
     moved = values - term.nominal
     # A payload or a tilt may be told by any of its numbers.
     told = (np.abs(moved) > _SIGMAS * deviations) & (moved > term.least + 1e-3 * term.scale)
+    if any(number.has_to_be and not one for number, one in zip(term.numbers, told, strict=True)):
+        return False
     return bool(told[0] if term.rows else np.any(told))
 
 
@@ -259,7 +284,23 @@ def _parameters(solved: Solved, place: int, candidate: Candidate) -> dict[str, F
 
 
 def tuned_parameters(solved: Solved) -> dict[str, FittedNumber]:
-    """Give what moved within its tolerance: masses of the links, N of their spread."""
+    """Give what moved within its tolerance: gains of the loops and masses of the links."""
+    return {**_tuned_gains(solved), **_tuned_masses(solved)}
+
+
+def _tuned_gains(solved: Solved) -> dict[str, FittedNumber]:
+    torques, found = solved.torques, {}
+    for name, both in solved.gains().items():
+        row = torques.log.joints.index(name)
+        hinge = torques.joints[row].kind == "hinge"
+        units = ("N m/rad", "N m s/rad") if hinge else ("N/m", "N s/m")
+        for which, (value, std), unit in zip(("kp", "kd"), both, units, strict=True):
+            believed = None if name in torques.guessed else float(getattr(torques, which)[row])
+            found[f"{name}.{which}"] = FittedNumber(value=value, std=std, unit=unit, nominal=believed)
+    return found
+
+
+def _tuned_masses(solved: Solved) -> dict[str, FittedNumber]:
     contest, best, robot = solved.contest, solved.best, solved.torques.robot
     numbers, found = inertial_numbers(robot), {}
     deviations = np.sqrt(np.diag(best.covariance))

@@ -132,7 +132,8 @@ class Contest:
         self._blocks = np.concatenate(blocks)
         self._whiten = np.sqrt(torques.numbers_a_sample) * there / torques.noise[:, None]
         self.count = torques.numbers_a_sample * np.sum(there, axis=1)
-        self._gram, self._right = self._moments(self._blocks, self._blocks)
+        self._there = np.any(self._blocks, axis=2)
+        self._gram, self._right = self._moments(self._blocks, self._there)
         self._energy = np.sum((torques.missing * self._whiten) ** 2, axis=1)
         self._start = 1.0 / (1.0 + np.maximum(self._energy - self.count, 0.0) / np.maximum(self.count, 1.0))
         starts = np.cumsum([self.within, *(len(term.scale) for term in self.terms)])
@@ -152,23 +153,30 @@ class Contest:
         """Columns of the joints alone with rows of zeros for their loops."""
         return np.pad(columns, ((0, 0), (0, len(self.torques.missing) - columns.shape[1]), (0, 0)))
 
-    def _moments(self, some: Real, others: Real) -> tuple[Real, Real]:
-        """Give ``[joint, some, others]`` of whitened columns, and ``[joint, some]`` with what is missing."""
-        gram = np.zeros((some.shape[1], len(some), len(others)))
+    def _moments(self, some: Real, there: Mask) -> tuple[Real, Real]:
+        """Give ``[row, some, all]`` of whitened columns, and ``[row, some]`` with what is missing.
+
+        Parameters
+        ----------
+        there
+            ``[some, row]``: where they aren't zero.
+        """
+        gram = np.zeros((some.shape[1], len(some), len(self._blocks)))
         right = np.zeros(gram.shape[:2])
         for row, whiten in enumerate(self._whiten):
             # Most columns are laws of another joint.
-            here, there = (np.flatnonzero(np.any(one[:, row], axis=1)) for one in (some, others))
-            left = some[here, row] * whiten
-            gram[row][np.ix_(here, there)] = left @ (others[there, row] * whiten).T
-            right[row, here] = left @ (self.torques.missing[row] * whiten)
+            here, others = np.flatnonzero(there[:, row]), np.flatnonzero(self._there[:, row])
+            if here.size:
+                left = some[here, row] * whiten**2
+                gram[row][np.ix_(here, others)] = left @ self._blocks[others, row].T
+                right[row, here] = left @ self.torques.missing[row]
         return gram, right
 
     def narrowed(self, terms: Sequence[Term]) -> "Contest":
         """Give the contest of these terms alone, at the same prices."""
         chosen, other = self._chosen(terms), copy(self)
         other.terms = list(terms)
-        other._blocks, other._least = self._blocks[chosen], self._least[chosen]
+        other._blocks, other._least, other._there = self._blocks[chosen], self._least[chosen], self._there[chosen]
         other._gram, other._right = self._gram[:, chosen[:, None], chosen], self._right[:, chosen]
         counts = np.cumsum([self.within, *(len(term.scale) for term in terms)])
         other._places = {id(term): np.arange(a, a + len(term.scale)) for term, a in zip(terms, counts, strict=False)}
@@ -179,8 +187,9 @@ class Contest:
         other, columns = copy(self), self._padded(term.columns) * term.scale[:, None, None]
         first, count = len(self._blocks), len(columns)
         other.terms = [*self.terms, term]
-        other._blocks = np.concatenate([self._blocks, columns])
-        gram, right = self._moments(columns, other._blocks)
+        there = np.any(columns, axis=2)
+        other._blocks, other._there = np.concatenate([self._blocks, columns]), np.concatenate([self._there, there])
+        gram, right = other._moments(columns, there)
         whole = np.zeros((len(gram), first + count, first + count))
         whole[:, :first, :first] = self._gram
         whole[:, first:], whole[:, :, first:] = gram, np.swapaxes(gram, 1, 2)
@@ -294,14 +303,22 @@ class Contest:
         chosen = self._chosen(fit.terms)
         gram = np.tensordot(weight, self._gram[:, :, chosen], 1)
         rest = weight @ self._right - gram @ fit.numbers
-        found = []
-        for term in self.terms:
-            at = self._places[id(term)]
-            own = np.tensordot(weight, self._gram[:, at[:, None], at], 1) + np.eye(at.size)
-            own -= gram[at] @ fit.covariance @ gram[at].T
-            gain = rest[at] @ np.linalg.solve(own, rest[at]) - np.linalg.slogdet(own)[1]
-            found.append((0.5 * float(gain), term))
+        found: list[tuple[float, Term]] = []
+        for at, terms in self._alike():
+            own = np.tensordot(weight, self._gram[:, at[:, :, None], at[:, None, :]], 1) + np.eye(at.shape[1])
+            own -= gram[at] @ fit.covariance @ np.swapaxes(gram[at], 1, 2)
+            wanted = rest[at]
+            gains = np.einsum("tk,tk->t", wanted, np.linalg.solve(own, wanted[..., None])[..., 0])
+            gains -= np.linalg.slogdet(own)[1]
+            found += zip((0.5 * gains).tolist(), terms, strict=True)
         return sorted(found, key=lambda one: one[0], reverse=True)
+
+    def _alike(self) -> list[tuple[Index, list[Term]]]:
+        """Terms with as many numbers, and the places of these ``[term, number]``."""
+        by_count: dict[int, list[Term]] = {}
+        for term in self.terms:
+            by_count.setdefault(len(term.numbers), []).append(term)
+        return [(np.array([self._places[id(one)] for one in each]), each) for each in by_count.values()]
 
     def course(self, fit: Fit) -> tuple[Real, Real]:
         """Give ``[coarse]``: energy that a fit leaves over all joints, whitened, and what noise alone would leave."""

@@ -27,7 +27,9 @@ def drives(torques: Torques) -> Iterator[Term]:
         columns = at_row(
             torques, _limited(torques, row), (torques.answered if torques.gives else torques.wanted)[row]
         )
-        yield Term(word="gain_error", site=joint.name, columns=columns, numbers=(over,))
+        # Where nobody says a loop's gains there's none that is wrong.
+        if joint.name not in torques.guessed:
+            yield Term(word="gain_error", site=joint.name, columns=columns, numbers=(over,))
         if not torques.by_effort or torques.gives or torques.log.effort_kind != "measured":
             yield from _saturation(torques, row, joint)
             yield from _dead_zone(torques, row, joint)
@@ -121,6 +123,8 @@ def _of_drive(torques: Torques, row: int, word: str, column: Real) -> Term:
 
 def _gains(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.rows:
+        if joint.name in torques.guessed:
+            continue
         damped = torques.kd[row] * torques.velocity[row]
         yield Term(
             word="controller_gain", site=joint.name,

@@ -28,6 +28,8 @@ from chladni.signals.arrays import Mask, Real
 #: Least length of the blocks of which every other one judges, in periods of the cutoff.
 _PERIODS = 16.0
 _ROUNDING = 1e-6
+#: A drive gives at most ten times what it's asked for.
+_LEAST_OVER = 0.1
 #: Of the link's inertia: least rotor of a motor that runs ahead of it.
 _LEAST_ROTOR = 0.01
 
@@ -44,7 +46,7 @@ class Confirmed:
         was found.
     joints
         Names.
-    per_joint_before, per_joint_after
+    per_joint_before, per_joint_tuned, per_joint_after
         ``[joint]``: the same of each; NaN where it doesn't move.
     motion
         ``[joint]``: RMS of the measured position about its mean, rad (m).
@@ -65,6 +67,7 @@ class Confirmed:
     after: float
     joints: tuple[str, ...]
     per_joint_before: Real
+    per_joint_tuned: Real
     per_joint_after: Real
     motion: Real
     time_s: Real
@@ -74,6 +77,11 @@ class Confirmed:
     judged: Mask
     horizon_s: float
     held_out: bool
+
+    @property
+    def denies(self) -> bool:
+        """Whether positions come out worse with what was found than without it, or not at all."""
+        return self.after > self.tuned or self.after > 1.0
 
 
 def machine_of(contest: Contest, fit: Fit) -> Machine:
@@ -134,9 +142,9 @@ class _Reading:
         one, described = self._joints[name], self._described[name]
         found = {term.word: values for term, values in self._terms if term.site == name}
         over_kp, kd_over_kp = found.get("controller_gain", np.array([1.0, 0.0]))
-        tolerance = self._robot.tolerance.gains
-        over_kp = float(over_kp) + tolerance * self._within.get(f"{name}.kp", 0.0)
-        kd_over_kp = float(kd_over_kp) + tolerance * self._within.get(f"{name}.kd", 0.0)
+        doubts = self._torques.gain_doubts(self._torques.log.joints.index(name))
+        over_kp = max(float(over_kp) + doubts[0] * self._within.get(f"{name}.kp", 0.0), _LEAST_OVER)
+        kd_over_kp = float(kd_over_kp) + doubts[1] * self._within.get(f"{name}.kd", 0.0)
         gain = 1.0 / float(found["gain_error"][0]) if "gain_error" in found else 1.0
         share = gain / over_kp
         one = replace(
@@ -379,7 +387,7 @@ def _told(
     whole = [float(np.sqrt(np.mean(one[moves] ** 2))) if moves.any() else float("nan") for one in per_joint]
     return Confirmed(
         before=whole[0], tuned=whole[1], after=whole[2], joints=torques.log.joints,
-        per_joint_before=per_joint[0], per_joint_after=per_joint[2], motion=motion,
+        per_joint_before=per_joint[0], per_joint_tuned=per_joint[1], per_joint_after=per_joint[2], motion=motion,
         time_s=torques.log.time_s, measured=measured, simulated_before=courses[0], simulated_after=courses[2],
         judged=there, horizon_s=max(b - a for a, b in runs) / torques.log.sample_rate_hz, held_out=held_out,
     )  # fmt: skip

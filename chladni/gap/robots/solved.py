@@ -9,17 +9,23 @@ import numpy as np
 from chladni.gap.calibration import SAME
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forms import refined
+from chladni.gap.robots.gains import Gains, guessed_gains, unknown_gains, with_gains
 from chladni.gap.robots.pushes import Push, price, pushed, pushes_of
 from chladni.gap.robots.search import searched
 from chladni.gap.robots.term import SENSES, Term
 from chladni.gap.robots.told import TOLD, Numbers
 from chladni.gap.robots.torques import ALL_COMMANDS, FormKey, Torques
 from chladni.signals.arrays import Real
+from chladni.signals.errors import ModelError
 
 #: Times that columns are made anew for what was found, until that moves by less than so many seconds and metres.
 _SHIFTS, _SETTLED_S, _SETTLED_M = 5, 1e-4, 2e-3
 #: Deviations of its mass from which a payload has a place.
 _TOLD_BY = 2.0
+#: Times that gains which nobody says are guessed anew, until they move by less.
+_GUESSES, _SETTLED_GAIN = 2, 0.05
+#: A drive gives at most ten times what it's asked for.
+_LEAST_OVER = 0.1
 #: Of a form: by how little it moves when it has settled.
 _SETTLED = 0.01
 
@@ -69,6 +75,24 @@ class Solved:
             found[term.form.name] = (term.form.value, float(spread), term.form.unit)
         return found
 
+    def gains(self) -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:
+        """Give kp and kd of loops whose gains are in doubt, each with its standard deviation."""
+        torques, best, tolerated = self.torques, self.best, self.contest.tolerated
+        deviations, found = np.sqrt(np.diag(best.covariance)), {}
+        for row, joint in torques.rows:
+            if f"{joint.name}.kp" not in tolerated:
+                continue
+            kp, kd = (tolerated.index(f"{joint.name}.{which}") for which in ("kp", "kd"))
+            doubts = torques.gain_doubts(row)
+            over = max(1.0 + doubts[0] * float(best.numbers[kp]), _LEAST_OVER)
+            stiffness = float(torques.kp[row]) / over
+            damping = float(torques.kd[row]) * (1.0 + doubts[1] * float(best.numbers[kd]) / over)
+            spread = float(torques.kd[row]) * doubts[1] * float(deviations[kd]) / over
+            found[joint.name] = (
+                (stiffness, stiffness * doubts[0] * float(deviations[kp]) / over), (max(damping, 0.0), spread)
+            )  # fmt: skip
+        return found
+
     def _gain(self, term: Term) -> float:
         """Of the drive that a law was found at: its numbers are in units of what was asked."""
         sites = {self.torques.joints[row].name for row in term.rows}
@@ -86,6 +110,31 @@ def solved(torques: Torques, left_out: frozenset[str], progress: Callable[[float
     left_out
         Words that don't take part.
     """
+    names = unknown_gains(torques)
+    if names:
+        torques = _guessing(torques, guessed_gains(torques, names))
+    if not np.any(torques.driven):
+        raise ModelError(
+            f"{torques.robot.name}: no gains of its drives, and {torques.log.log} has no measured effort; give kp and kd "
+            "under [control] of a robot file, or record efforts"
+        )
+    found = _without_pushes(torques, left_out, progress)
+    for _ in range(_GUESSES * bool(names)):
+        gains = {name: (kp[0], kd[0]) for name, (kp, kd) in found.gains().items() if name in torques.guessed}
+        before = dict(zip(torques.log.joints, torques.kp.tolist(), strict=True))
+        if all(abs(kp / before[name] - 1.0) < _SETTLED_GAIN for name, (kp, _) in gains.items()):
+            break
+        torques = _guessing(torques, gains)
+        found = _without_pushes(torques, left_out, progress)
+    return found
+
+
+def _guessing(torques: Torques, gains: Gains) -> Torques:
+    robot = with_gains(torques.robot, gains)
+    return Torques(robot=robot, log=torques.log, cutoff_hz=torques.cutoff_hz, guessed=frozenset(gains))
+
+
+def _without_pushes(torques: Torques, left_out: frozenset[str], progress: Callable[[float], None]) -> Solved:
     found = _settled(Contest(torques, left_out), left_out, progress)
     for fit in (found.best, found.contest.nothing):
         away = pushed(found.contest, fit)
@@ -103,7 +152,7 @@ def _settled(contest: Contest, left_out: frozenset[str], progress: Callable[[flo
     spread: dict[FormKey, float] = {}
     for _ in range(_SHIFTS):
         late, centres = _guesses(contest.torques, best)
-        forms, spread = refined(contest, best)
+        forms, spread = refined(contest, best, contest.torques.forms)
         leveled = contest.torques.with_level(contest.quietest(best))
         guessed = leveled.with_guesses(late, centres, forms, contest.explained(best))
         if _is_settled(contest.torques, guessed):
@@ -134,7 +183,7 @@ def _is_settled(before: Torques, after: Torques) -> bool:
         ({key: np.log(abs(one)) for key, one in before.forms.items()},
          {key: np.log(abs(one)) for key, one in after.forms.items()}, _SETTLED),
     )  # fmt: skip
-    return np.all(np.abs(np.log(after.level / before.level)) < np.log(SAME)) and all(
+    return bool(np.all(np.abs(np.log(after.level / before.level)) < np.log(SAME))) and all(
         old.keys() == new.keys() and all(np.max(np.abs(new[key] - old[key])) < close for key in new)
         for old, new, close in guesses
     )

@@ -25,9 +25,11 @@ def tolerances(torques: Torques) -> tuple[Real, list[str]]:
             found.append((f"{joint.name}.armature", tolerance.inertia * at_row(torques, row, own)[0]))
         if tolerance.friction > 0:
             found.append((f"{joint.name}.friction", tolerance.friction * at_row(torques, row, torques.sign[row])[0]))
-        if tolerance.gains > 0 and served:
+        doubts = np.array(torques.gain_doubts(row))
+        if doubts[0] > 0 and served:
             damped = torques.kd[row] * torques.velocity[row]
-            both = at_row(torques, torques.servo_row(row), torques.answered[row] + damped, damped) * tolerance.gains
+            both = at_row(torques, torques.servo_row(row), torques.answered[row] + damped, damped)
+            both *= doubts[:, None, None]
             found += zip((f"{joint.name}.kp", f"{joint.name}.kd"), both, strict=True)
     if served:
         # A digital servo holds what it reads for a period.

@@ -38,6 +38,8 @@ _ORDER = 4
 _LINES, _CLEAR = 64, 0.02
 #: By how much a joint is turned to tell what that changes, rad (m), RMS.
 _TURN = 1e-4
+#: Of a gain that nobody says, over what was guessed.
+_UNKNOWN_GAIN = 0.5
 #: A stamp that is just reached counts.
 _TIE_S = 1e-7
 ALL_COMMANDS = "all commands"
@@ -73,6 +75,8 @@ class Torques:
         Of the filter, whose phase is zero.
     away
         Stretches that don't count, s from the log's start.
+    guessed
+        Joints whose gains nobody says.
     memory
         Of what stays as it is whatever is guessed.
     """
@@ -86,6 +90,7 @@ class Torques:
     explained: Real | None = None
     level: Real | None = None
     away: tuple[tuple[float, float], ...] = ()
+    guessed: frozenset[str] = frozenset()
     memory: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -518,12 +523,25 @@ class Torques:
         object.__setattr__(other, "level", np.clip(over_noise * level, least, 1.0))
         return other
 
+    def gain_doubts(self, row: int) -> tuple[float, float]:
+        """Give standard deviations of kp over its value, and of ``kd/kp`` over its own, of a joint's loop."""
+        if self.joints[row].name not in self.guessed:
+            return self.robot.tolerance.gains, self.robot.tolerance.gains
+        # As much as a usual torque at a usual speed.
+        usual = float(np.std(self.drive[row])) / rms(self.velocity[row])
+        return _UNKNOWN_GAIN, usual / max(float(self.kd[row]), 1e-12)
+
+    @cached_property
+    def moves(self) -> Mask:
+        """``[joint, coarse]``: where a joint isn't stuck."""
+        rests = np.abs(self.fast_velocity) < self.slow[:, None]
+        # Whatever the filter mixes in.
+        return np.asarray(self.smooth(rests.astype(np.float64)) < _MIXED)
+
     @cached_property
     def moving(self) -> Mask:
         """``[row, coarse]``: where a joint isn't stuck: then friction is anything between its two values."""
-        rests = np.abs(self.fast_velocity) < self.slow[:, None]
-        # Whatever the filter mixes in.
-        moving = (self.smooth(rests.astype(np.float64)) < _MIXED) & self.driven[:, None]
+        moving = self.moves & self.driven[:, None]
         times = self.log.time_s[self.kept]
         for start_s, end_s in self.away:
             moving[:, (times >= start_s) & (times <= end_s)] = False
@@ -586,17 +604,12 @@ def _integral(at: Real, starts: Real, values: Real, sums: Real) -> Real:
 def torques_of(robot: Robot, log: JointLog) -> Torques:
     """Give the torques of a log."""
     cutoff = min(CUTOFF_HZ, _MOST * log.sample_rate_hz)
-    found = Torques(robot=robot, log=log, cutoff_hz=cutoff)
     if robot.base == "floating":
         raise ModelError(
             f"{robot.name}: its base floats, and inverse dynamics needs its pose; fix it in the description (leave "
             "out its free joint) and hang the robot up to diagnose its joints"
         )
+    found = Torques(robot=robot, log=log, cutoff_hz=cutoff)
     if log.command is None and not found.by_effort:
         raise LogError(f"{log.log}: neither commands nor measured efforts; record one of them beside the states")
-    if not np.any(found.driven):
-        raise ModelError(
-            f"{robot.name}: no gains of its drives, and {log.log} has no measured effort; give kp and kd under "
-            "[control] of a robot file, or record efforts"
-        )
     return found

@@ -49,7 +49,11 @@ def _over(joint: RobotJoint) -> str:
 
 def _rotor(torques: Torques, row: int, joint: RobotJoint) -> Number:
     scale = usual(torques, row) / rms(torques.acceleration[row])
-    return Number(name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", scale=scale, least=0.0)
+    return Number(
+        name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", scale=scale, least=0.0,
+        # A motor has a rotor, here or in the description.
+        has_to_be=joint.armature == 0.0,
+    )  # fmt: skip
 
 
 def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Real, number: Number) -> Iterator[Term]:
@@ -57,7 +61,8 @@ def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Re
     rate, acceleration = torques.coarse_rate(ahead), torques.coarse_rate(torques.coarse_rate(ahead))
     rotor = _rotor(torques, row, joint)
     both = Number(name="both", unit="1", scale=number.scale * rotor.scale, least=0.0)
-    columns, numbers = at_row(torques, row, torques.acceleration[row], acceleration), (rotor, both)
+    columns = at_row(torques, row, torques.acceleration[row], acceleration)
+    numbers: tuple[Number, ...] = (rotor, both)
     rows = tuple(dict.fromkeys([row, torques.servo_row(row)]))
     if _loop_is_known(torques, row):
         # The loop works on the motor's angle.
