@@ -25,7 +25,7 @@ class Needed(Value):
         ``[dof, sample, link, 10]``: the torque is linear in a link's `INERTIAL` numbers (Atkeson, An & Hollerbach
         1986); per kg, kg m, kg m^2.
     inertia
-        ``[dof]``: mean of the diagonal of the joint-space inertia, kg m^2 (kg).
+        ``[dof, dof]``: the joint-space inertia, RMS over the poses, kg m^2 (kg).
     """
 
     torque: Real
@@ -44,10 +44,10 @@ def needed_torque(robot: Robot, position: Real, velocity: Real, acceleration: Re
     position, velocity, acceleration
         ``[dof, sample]``, SI; of every degree of freedom of the robot in its order.
     """
-    from chladni.robots.mujoco_motion import inertia_diagonal, walk
+    from chladni.robots.mujoco_motion import inertia_rms, walk
 
     torque, links = walk(robot.model, position, velocity, acceleration)
-    return Needed(torque=torque, regressor=_regressor(links), inertia=inertia_diagonal(robot.model, position))
+    return Needed(torque=torque, regressor=_regressor(links), inertia=inertia_rms(robot.model, position))
 
 
 def motion_torque(robot: Robot, position: Real, velocity: Real, acceleration: Real) -> Real:

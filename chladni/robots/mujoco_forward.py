@@ -15,7 +15,7 @@ from chladni.robots.dynamics import inertial_numbers
 from chladni.robots.joint_laws import Between, followed, further_laws, tooth_of
 from chladni.robots.loading import made_of
 from chladni.robots.machine import about_centre
-from chladni.robots.mujoco_motion import gravity_of, inertia_diagonal
+from chladni.robots.mujoco_motion import gravity_of, inertia_rms
 
 if TYPE_CHECKING:
     from chladni.robots.description import Description
@@ -68,7 +68,7 @@ class Driven:
 def longest_step_s(machine: Machine, names: Sequence[str]) -> float:
     """Give the step at which no servo of these joints turns stiff, at most a millisecond."""
     model = model_of(machine, names)
-    inertia = inertia_diagonal(model, np.asarray(model.qpos0, dtype=np.float64)[:, None])
+    inertia = np.diag(inertia_rms(model, np.asarray(model.qpos0, dtype=np.float64)[:, None]))
     found = _LONGEST_S
     for one in _chosen(machine, names):
         stiffness = one.gains()[0] + one.stiffness + sum(each.stiffness for each in one.stops)
@@ -265,7 +265,7 @@ class _Run:
         return np.concatenate(found).T + self._row("reading")[:, None]
 
     def _inertia(self) -> Real:
-        diagonal = inertia_diagonal(self._model, np.asarray(self._model.qpos0, dtype=np.float64)[:, None])
+        diagonal = np.diag(inertia_rms(self._model, np.asarray(self._model.qpos0, dtype=np.float64)[:, None]))
         return diagonal[[one.joint.dof for one in self._joints]]
 
     def _start(self, position: Real, velocity: Real, ahead: Real) -> None:

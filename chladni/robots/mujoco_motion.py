@@ -47,20 +47,20 @@ def walk(model: Any, position: Real, velocity: Real, acceleration: Real) -> tupl
     return torque, (translate, rotate, turned, accel[..., 3:], accel[..., :3], speed[..., :3])
 
 
-def inertia_diagonal(model: Any, position: Real) -> Real:
-    """Give ``[dof]``: mean diagonal of the joint-space inertia over some poses of ``[dof, sample]``."""
+def inertia_rms(model: Any, position: Real) -> Real:
+    """Give ``[dof, dof]``: joint-space inertia, RMS over some poses of ``[dof, sample]``."""
     import mujoco
 
     quiet, data = _quiet(model)
     poses = position[:, :: max(position.shape[1] // _POSES, 1)].T
-    found, unit, product = np.zeros(quiet.nv), np.eye(quiet.nv), np.zeros(quiet.nv)
+    found, unit, product = np.zeros((quiet.nv, quiet.nv)), np.eye(quiet.nv), np.zeros(quiet.nv)
     for pose in poses:
         data.qpos[:] = pose
         mujoco.mj_forward(quiet, data)
         for dof in range(quiet.nv):
             mujoco.mj_mulM(quiet, data, product, unit[dof])
-            found[dof] += product[dof]
-    return found / len(poses)
+            found[dof] += product**2
+    return np.asarray(np.sqrt(found / len(poses)))
 
 
 def torque_alone(model: Any, position: Real, velocity: Real, acceleration: Real) -> Real:

@@ -32,7 +32,7 @@ def test_a_pendulum_needs_what_a_closed_form_says(tmp_path: Path) -> None:
     np.testing.assert_allclose(need.torque[0], -moment * np.sin(angle), atol=1e-12)
     # The inertia about the shoulder, of a straight arm: armature, then each link's own and where it is.
     straight = 0.1 + (0.02 + 2.0 * 0.2**2) + (0.01 + 1.0 * 0.5**2)
-    assert needed_torque(robot, still[:, :1], still[:, :1], still[:, :1]).inertia[0] == pytest.approx(straight)
+    assert needed_torque(robot, still[:, :1], still[:, :1], still[:, :1]).inertia[0, 0] == pytest.approx(straight)
 
 
 def test_a_base_that_is_turned_about_y_is_a_shoulder_that_is(tmp_path: Path) -> None:

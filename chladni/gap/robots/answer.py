@@ -253,8 +253,6 @@ def _is_told(best: Fit, place: int) -> bool:
     moved = values - term.nominal
     # A payload or a tilt may be told by any of its numbers.
     told = (np.abs(moved) > _SIGMAS * deviations) & (moved > term.least + 1e-3 * term.scale)
-    if any(number.has_to_be and not one for number, one in zip(term.numbers, told, strict=True)):
-        return False
     return bool(told[0] if term.rows else np.any(told))
 
 

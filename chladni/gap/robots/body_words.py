@@ -11,6 +11,8 @@ from chladni.robots.dynamics import inertial_numbers
 from chladni.signals.arrays import Real
 
 WORLD = "world"
+#: Variant of an encoder's offset: the log's reading, not the loop's.
+OF_THE_LOG = "of the log"
 #: Standard deviations before a log is seen: a reading (rad), a tilt (rad), a mass over the link's own.
 _READING, _TILT, _MASS = 0.05, 0.1, 0.5
 #: A payload over the heaviest link, at so many metres.
@@ -23,8 +25,8 @@ def readings(torques: Torques) -> Iterator[Term]:
     """Encoders whose zero is elsewhere."""
     number = Number(name="offset", unit="rad", scale=_READING)
     for row, joint in torques.rows:
-        columns = torques.offset[row][None]
-        yield Term(word="encoder_offset", site=joint.name, columns=columns, numbers=(number,), variant="of the log")
+        columns = torques.offset(row)[None]
+        yield Term(word="encoder_offset", site=joint.name, columns=columns, numbers=(number,), variant=OF_THE_LOG)
         if (torques.two_sided or not torques.by_effort) and torques.kp[row] > 0:
             columns = at_row(torques, torques.servo_row(row), np.full(torques.missing.shape[1], torques.kp[row]))
             yield Term(
@@ -54,7 +56,7 @@ def payloads(torques: Torques) -> Iterator[Term]:
     for name, _, columns in _links(torques):
         # What is fixed to a link moves as one with it: a payload on it is one on the link.
         if name in moved:
-            around = _moments_of_point(torques.centre_m.get(name, np.zeros(3)))
+            around = _moments_of_point(torques.guesses.centre_m.get(name, np.zeros(3)))
             point = np.einsum("p,pjk->jk", around, columns[4:])
             whole = np.concatenate([columns[:1] + point, columns[1:4]])
             yield Term(word="payload", site=name, columns=whole, numbers=load, reach=_FAR * _REACH_M)

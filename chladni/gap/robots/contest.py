@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import comb, log, log1p
 
 import numpy as np
@@ -172,9 +173,14 @@ class Contest:
                 right[row, here] = left @ self.torques.missing[row]
         return gram, right
 
+    def _copied(self) -> "Contest":
+        other = copy(self)
+        vars(other).pop("_alike", None)
+        return other
+
     def narrowed(self, terms: Sequence[Term]) -> "Contest":
         """Give the contest of these terms alone, at the same prices."""
-        chosen, other = self._chosen(terms), copy(self)
+        chosen, other = self._chosen(terms), self._copied()
         other.terms = list(terms)
         other._blocks, other._least, other._there = self._blocks[chosen], self._least[chosen], self._there[chosen]
         other._gram, other._right = self._gram[:, chosen[:, None], chosen], self._right[:, chosen]
@@ -184,7 +190,7 @@ class Contest:
 
     def joined(self, term: Term) -> "Contest":
         """Give the contest with one term more, at the same prices."""
-        other, columns = copy(self), self._padded(term.columns) * term.scale[:, None, None]
+        other, columns = self._copied(), self._padded(term.columns) * term.scale[:, None, None]
         first, count = len(self._blocks), len(columns)
         other.terms = [*self.terms, term]
         there = np.any(columns, axis=2)
@@ -275,7 +281,7 @@ class Contest:
         return [np.array(one, dtype=np.intp) for one in found]
 
     def _left(self, gram: Real, right: Real, numbers: Real, laws: Sequence[Index]) -> tuple[JointLeft, ...]:
-        energy = self._energy - 2.0 * right @ numbers + np.einsum("p,jpq,q->j", numbers, gram, numbers)
+        energy = self._energy - 2.0 * right @ numbers + (gram @ numbers) @ numbers
         found = []
         for row, places in enumerate(laws):
             own = numbers[places] @ gram[row][np.ix_(places, places)] @ numbers[places]
@@ -301,11 +307,13 @@ class Contest:
         if weight is None:
             weight = np.array([one.weight for one in fit.left])
         chosen = self._chosen(fit.terms)
-        gram = np.tensordot(weight, self._gram[:, :, chosen], 1)
+        gram = np.zeros((len(self._blocks), chosen.size))
+        for row in np.flatnonzero(weight):
+            gram += weight[row] * self._gram[row][:, chosen]
         rest = weight @ self._right - gram @ fit.numbers
         found: list[tuple[float, Term]] = []
-        for at, terms in self._alike():
-            own = np.tensordot(weight, self._gram[:, at[:, :, None], at[:, None, :]], 1) + np.eye(at.shape[1])
+        for at, terms, blocks in self._alike:
+            own = np.tensordot(weight, blocks, 1) + np.eye(at.shape[1])
             own -= gram[at] @ fit.covariance @ np.swapaxes(gram[at], 1, 2)
             wanted = rest[at]
             gains = np.einsum("tk,tk->t", wanted, np.linalg.solve(own, wanted[..., None])[..., 0])
@@ -313,12 +321,17 @@ class Contest:
             found += zip((0.5 * gains).tolist(), terms, strict=True)
         return sorted(found, key=lambda one: one[0], reverse=True)
 
-    def _alike(self) -> list[tuple[Index, list[Term]]]:
-        """Terms with as many numbers, and the places of these ``[term, number]``."""
+    @cached_property
+    def _alike(self) -> list[tuple[Index, list[Term], Real]]:
+        """Terms with as many numbers, the places of these ``[term, number]``, and their moments."""
         by_count: dict[int, list[Term]] = {}
         for term in self.terms:
             by_count.setdefault(len(term.numbers), []).append(term)
-        return [(np.array([self._places[id(one)] for one in each]), each) for each in by_count.values()]
+        found = []
+        for terms in by_count.values():
+            at = np.array([self._places[id(one)] for one in terms])
+            found.append((at, terms, self._gram[:, at[:, :, None], at[:, None, :]]))
+        return found
 
     def course(self, fit: Fit) -> tuple[Real, Real]:
         """Give ``[coarse]``: energy that a fit leaves over all joints, whitened, and what noise alone would leave."""

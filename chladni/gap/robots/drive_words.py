@@ -140,7 +140,7 @@ def delays(torques: Torques) -> Iterator[Term]:
     """Commands that come late: all of them, or those of a joint beside them."""
     if torques.log.command_kind != "position" or (torques.by_effort and not torques.two_sided):
         return
-    believed, common = torques.robot.delay_s, torques.late_s.get(ALL_COMMANDS, 0.0)
+    believed, common = torques.robot.delay_s, torques.guesses.late_s.get(ALL_COMMANDS, 0.0)
     delay = Number(name="delay", unit="s", scale=_DELAY_S, least=-believed, nominal=believed)
     own = Number(name="delay", unit="s", scale=_DELAY_S, least=-believed - common)
     for secant_s in (None, *_SECANTS_S):
@@ -151,7 +151,7 @@ def delays(torques: Torques) -> Iterator[Term]:
         )
         late = torques.late(common, 0.0 if secant_s is None else secant_s)
         for row, joint in torques.rows:
-            found = torques.late_s.get(joint.name, 0.0)
+            found = torques.guesses.late_s.get(joint.name, 0.0)
             alone = torques.late(common, found)[row] if secant_s is None and found else late[row]
             columns = at_row(torques, torques.servo_row(row), alone)
             yield Term(word="delay", site=joint.name, columns=columns, numbers=(own,), variant=variant)

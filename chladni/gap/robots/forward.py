@@ -10,7 +10,7 @@ from chladni.gap.robots.solved import Solved
 from chladni.gap.robots.term import SENSES, Term
 from chladni.gap.robots.tolerances import INERTIAL_NAMES, LOOP_S, tolerated_inertia
 from chladni.gap.robots.torques import ALL_COMMANDS, Torques
-from chladni.gap.robots.transmission_words import AT_MOTOR
+from chladni.gap.robots.transmission_words import AT_MOTOR, LEAST_ROTOR
 from chladni.robots.dynamics import inertial_numbers
 from chladni.robots.machine import (
     Coupling,
@@ -30,8 +30,6 @@ _PERIODS = 16.0
 _ROUNDING = 1e-6
 #: A drive gives at most ten times what it's asked for.
 _LEAST_OVER = 0.1
-#: Of the link's inertia: least rotor of a motor that runs ahead of it.
-_LEAST_ROTOR = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -233,7 +231,7 @@ def _transmission(one: MachineJoint, term: Term, values: Real, torques: Torques)
     # Where the log has efforts its product with the rotor is told.
     gives = found[first] if first in found else found["both"] / rotor if rotor else 0.0
     # A motor without a rotor can't be run.
-    rotor = max(rotor, _LEAST_ROTOR * float(torques.need.inertia[one.joint.dof]))
+    rotor = max(rotor, LEAST_ROTOR * float(torques.need.inertia[one.joint.dof, one.joint.dof]))
     stiffness = np.inf if first == "gap" or gives <= 0 else 1.0 / gives
     return replace(
         one,

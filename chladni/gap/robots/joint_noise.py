@@ -34,10 +34,12 @@ def _step(row: Real) -> float:
 
 
 def torque_noise(density: Real, cutoff_hz: float, *, stiffness: Real, damping: Real, inertia: Real) -> Real:
-    """Give ``[joint]``: variance of the torque that noise of the position seems to need below a cutoff.
+    """Give ``[joint]``: variance of the torque that noise of the positions seems to need below a cutoff.
 
-    Of stiffness (the servo's), damping and inertia at the joint: |k + i w d - w^2 m|^2 times the density.
+    Of stiffness (the servos') and damping at the joints, and of the inertia ``[joint, joint]`` by which each feels
+    the others: |k + i w d - w^2 m|^2 times the densities.
     """
     omega = 2.0 * np.pi * np.linspace(0.0, cutoff_hz, _LINES)
-    gain = np.abs(stiffness[:, None] + 1j * omega * damping[:, None] - omega**2 * inertia[:, None]) ** 2
-    return np.asarray(density * np.mean(gain, axis=1) * cutoff_hz)
+    own = np.abs(stiffness[:, None] + 1j * omega * damping[:, None] - omega**2 * np.diag(inertia)[:, None]) ** 2
+    others = (inertia - np.diag(np.diag(inertia))) ** 2 @ density * float(np.mean(omega**4))
+    return np.asarray((density * np.mean(own, axis=1) + others) * cutoff_hz)

@@ -191,7 +191,7 @@ def _periods(torques: Torques, row: int) -> tuple[list[float], int]:
               torques.drive[row], torques.wanted[row]]  # fmt: skip
     there = torques.moving[row]
     basis, _ = np.linalg.qr(np.array(smooth)[:, there].T)
-    turns = np.exp(1j * waves[:, None] * q[there])
+    turns = torques.waves(row, waves)[:, there]
     parts = np.stack([turns.real, turns.imag], axis=1)
     parts -= (parts @ basis) @ basis.T
     alone = rest[there] - basis @ (basis.T @ rest[there])

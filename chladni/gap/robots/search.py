@@ -7,7 +7,7 @@ from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.term import Term
 
 #: Terms that are fitted in full of those that promise most.
-_FITTED = 12
+_FITTED = 8
 #: The same in place of another.
 _EXCHANGED = 3
 #: Nats that a move has to bring.
@@ -38,7 +38,7 @@ def _more(contest: Contest, best: Fit) -> list[Fit]:
     if _best(found).nats > best.nats + _WORTH:
         return found
     # Where a description has too much of one thing and too little of another, either alone makes it worse.
-    return found + [two for one in found[:_FITTED] for two in _beside(contest, one)]
+    return found + [two for one in found[:_EXCHANGED] for two in _beside(contest, one)]
 
 
 def _beside(contest: Contest, one: Fit) -> list[Fit]:

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 
 from chladni.gap.calibration import SAME
+from chladni.gap.robots.body_words import OF_THE_LOG
 from chladni.gap.robots.contest import Contest, Fit
-from chladni.gap.robots.forms import refined
+from chladni.gap.robots.forms import Forms, refined
 from chladni.gap.robots.gains import Gains, guessed_gains, unknown_gains, with_gains
 from chladni.gap.robots.pushes import Push, price, pushed, pushes_of
 from chladni.gap.robots.search import searched
 from chladni.gap.robots.term import SENSES, Term
 from chladni.gap.robots.told import TOLD, Numbers
-from chladni.gap.robots.torques import ALL_COMMANDS, FormKey, Torques
-from chladni.signals.arrays import Real
+from chladni.gap.robots.torques import ALL_COMMANDS, FormKey, Guesses, Torques
 from chladni.signals.errors import ModelError
 
 #: Times that columns are made anew for what was found, until that moves by less than so many seconds and metres.
@@ -149,12 +149,11 @@ def _without_pushes(torques: Torques, left_out: frozenset[str], progress: Callab
 
 def _settled(contest: Contest, left_out: frozenset[str], progress: Callable[[float], None]) -> Solved:
     best = searched(contest, progress=progress)
-    spread: dict[FormKey, float] = {}
+    spread: Forms = {}
     for _ in range(_SHIFTS):
-        late, centres = _guesses(contest.torques, best)
-        forms, spread = refined(contest, best, contest.torques.forms)
+        forms, spread = refined(contest, best, contest.torques.guesses.forms)
         leveled = contest.torques.with_level(contest.quietest(best))
-        guessed = leveled.with_guesses(late, centres, forms, contest.explained(best))
+        guessed = leveled.with_guesses(_guesses(contest.torques, best, forms), contest.explained(best))
         if _is_settled(contest.torques, guessed):
             break
         contest = Contest(guessed, left_out)
@@ -162,28 +161,35 @@ def _settled(contest: Contest, left_out: frozenset[str], progress: Callable[[flo
     return Solved(contest=contest, best=best, spread=spread)
 
 
-def _guesses(torques: Torques, fit: Fit) -> tuple[dict[str, float], dict[str, Real]]:
-    """Delays beyond the described one, and centres of payloads whose mass is told."""
-    late, centres = {}, {}
+def _guesses(torques: Torques, fit: Fit, forms: Forms) -> Guesses:
+    """Delays beyond the described one, centres of payloads whose mass is told, offsets, and forms."""
+    late, centres, offset = {}, {}, {}
     for place, term in enumerate(fit.terms):
         values, deviations = fit.values(place)
         if term.word == "delay":
             late[term.site] = float(values[0]) - torques.robot.delay_s * (term.site == ALL_COMMANDS)
         elif term.word == "payload" and values[0] > _TOLD_BY * deviations[0]:
             centres[term.site] = np.asarray(values[1:] / values[0])
-    return late, centres
+        elif term.word == "encoder_offset" and term.variant == OF_THE_LOG:
+            offset[term.site] = float(values[0])
+    return Guesses(late_s=late, centre_m=centres, offset=offset, forms=forms)
 
 
 def _is_settled(before: Torques, after: Torques) -> bool:
     if before.level is None or after.level is None:
         return False
-    guesses: tuple[tuple[Mapping[Any, Any], Mapping[Any, Any], float], ...] = (
-        (before.late_s, after.late_s, _SETTLED_S),
-        (before.centre_m, after.centre_m, _SETTLED_M),
-        ({key: np.log(abs(one)) for key, one in before.forms.items()},
-         {key: np.log(abs(one)) for key, one in after.forms.items()}, _SETTLED),
-    )  # fmt: skip
-    return bool(np.all(np.abs(np.log(after.level / before.level)) < np.log(SAME))) and all(
-        old.keys() == new.keys() and all(np.max(np.abs(new[key] - old[key])) < close for key in new)
-        for old, new, close in guesses
+    old, new = before.guesses, after.guesses
+    pairs: tuple[tuple[Mapping[Any, Any], Mapping[Any, Any], float], ...] = (
+        (old.late_s, new.late_s, _SETTLED_S),
+        (old.centre_m, new.centre_m, _SETTLED_M),
+        (old.offset, new.offset, _SETTLED_M),
+        (_logs(old.forms), _logs(new.forms), _SETTLED),
     )
+    return bool(np.all(np.abs(np.log(after.level / before.level)) < np.log(SAME))) and all(
+        was.keys() == now.keys() and all(np.max(np.abs(now[key] - was[key])) < close for key in now)
+        for was, now, close in pairs
+    )
+
+
+def _logs(forms: Forms) -> dict[FormKey, float]:
+    return {key: float(np.log(abs(one) + 1e-30)) for key, one in forms.items()}

@@ -27,8 +27,6 @@ class Number:
         What it can't be below, beside the nominal one.
     nominal
         What the description believes, which is added when it's told.
-    has_to_be
-        Whether the law isn't one without it.
     """
 
     name: str
@@ -36,7 +34,6 @@ class Number:
     scale: float
     least: float = -np.inf
     nominal: float = 0.0
-    has_to_be: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -53,6 +53,28 @@ _SLOPE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105
 FormKey = tuple[str, str, str | None]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guesses:
+    """Numbers that columns are made for, since they aren't linear in them.
+
+    Attributes
+    ----------
+    late_s
+        Delays, by site.
+    centre_m
+        Centres of payloads, by link: their own inertia is that of a point there.
+    offset
+        What joints read too much, rad (m), by joint.
+    forms
+        Numbers of laws that were found between those of their grids.
+    """
+
+    late_s: Mapping[str, float] = field(default_factory=dict)
+    centre_m: Mapping[str, Real] = field(default_factory=dict)
+    offset: Mapping[str, float] = field(default_factory=dict)
+    forms: Mapping[FormKey, float] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Torques:
     """Torques of one log, smoothed alike, on a coarse grid.
@@ -61,12 +83,8 @@ class Torques:
     ----------
     robot, log
         The log's joints are the rows of all arrays.
-    late_s
-        Delays that were guessed, by site: what their columns are exact for.
-    centre_m
-        Centres of payloads that were guessed, by link: their own inertia is that of a point there.
-    forms
-        Numbers of laws that were found between those of their grids.
+    guesses
+        What columns are exact for.
     explained
         ``[row, coarse]``: missing torque that was explained already; nothing when None.
     level
@@ -84,9 +102,7 @@ class Torques:
     robot: Robot
     log: JointLog
     cutoff_hz: float
-    late_s: Mapping[str, float] = field(default_factory=dict)
-    centre_m: Mapping[str, Real] = field(default_factory=dict)
-    forms: Mapping[FormKey, float] = field(default_factory=dict)
+    guesses: Guesses = field(default_factory=Guesses)
     explained: Real | None = None
     level: Real | None = None
     away: tuple[tuple[float, float], ...] = ()
@@ -135,6 +151,21 @@ class Torques:
         """Filter ``[..., sample]`` of the log's grid, and give it on the coarse one."""
         return self._filtered(fast, self.cutoff_hz)[..., self.kept]
 
+    def waves(self, row: int, waves: Real) -> Real:
+        """``[wave, coarse]``: what the filter makes of ``exp(i wave q)``, rad/rad."""
+        stride = self._stride
+        # Twice as dense as the coarse grid at least, so that what is beyond the cutoff goes.
+        step = max((each for each in range(1, stride // 2 + 1) if stride % each == 0), default=1)
+        sections, found = _sections(self.cutoff_hz, self.log.sample_rate_hz / step), []
+        for (a, b), (first, last) in zip(self.stretches, self._coarse, strict=True):
+            begin = int(self.kept[first])
+            dense = self.fast_position[row, begin - (begin - a) // step * step : b : step]
+            turns = waves[:, None] * dense
+            smooth = [sosfiltfilt(sections, part(turns)) for part in (np.cos, np.sin)]
+            places = (begin - a) // step + np.arange(last - first) * (stride // step)
+            found.append(smooth[0][:, places] + 1j * smooth[1][:, places])
+        return np.concatenate(found, axis=1)
+
     @cached_property
     def loop(self) -> Real:
         """``[joint, coarse]``: missing torque a second that the servos' feedback comes late.
@@ -142,7 +173,7 @@ class Torques:
         Of kp q' + kd q'', which is what the command's motion asks less the rate of what is needed. Only up to where
         that stands above the noise of q, which is in the missing torque, too.
         """
-        found = self.late(self.late_s.get(ALL_COMMANDS, 0.0), 0.0)
+        found = self.late(self.guesses.late_s.get(ALL_COMMANDS, 0.0), 0.0)
         frequency_hz = np.linspace(0.0, self.cutoff_hz, _LINES)[1:]
         omega = 2.0 * np.pi * frequency_hz
         for row, own in enumerate(found):
@@ -248,15 +279,18 @@ class Torques:
         """``[2, joint, coarse]``: torque a radian of tilt about x and y."""
         return self.of_joints(gravity_columns(self.robot, self.all_positions))
 
-    @cached_property
-    def offset(self) -> Real:
-        """``[joint, joint, coarse]``: torque at the second a radian that the reading of the first is too large by."""
-        still = np.zeros_like(self.position[0])
-        return np.array([-self.turned(row, still + 1.0, still, still) for row in range(len(self.joints))])
+    def offset(self, row: int) -> Real:
+        """``[joint, coarse]``: missing torque a radian that a joint reads too much, about the guessed offset."""
+        guess, still = self.guesses.offset.get(self.joints[row].name, 0.0), np.zeros_like(self.position[0])
+        key = f"offset {row} {guess:g}"
+        if key not in self.memory:
+            step = guess if abs(guess) > _TURN else _TURN
+            self.memory[key] = self.turned(row, still - 1.0, still, still, step=step)
+        return np.asarray(self.memory[key])
 
-    def turned(self, row: int, position: Real, velocity: Real, acceleration: Real) -> Real:
-        """``[joint, coarse]``: needed torque a unit by which a joint is elsewhere than it reads."""
-        step, still = _TURN / rms(position), np.zeros(self.robot.model.nv)
+    def turned(self, row: int, position: Real, velocity: Real, acceleration: Real, step: float | None = None) -> Real:
+        """``[joint, coarse]``: needed torque a unit by which a joint is elsewhere than it reads, by so many units."""
+        step, still = step or _TURN / rms(position), np.zeros(self.robot.model.nv)
         dof = self.joints[row].dof
         moved = (
             self.all_positions.copy(),
@@ -486,7 +520,8 @@ class Torques:
     @cached_property
     def sensed_noise(self) -> Real:
         """``[row]``: standard deviation that the noise of sensors gives the missing torque."""
-        inertia = self.need.inertia[[one.dof for one in self.joints]]
+        dofs = [one.dof for one in self.joints]
+        inertia = self.need.inertia[np.ix_(dofs, dofs)]
         damping = np.array([one.damping for one in self.joints])
         by_position = not self.by_effort and self.log.command_kind == "position"
         kp, kd = (one * by_position for one in (self.kp, self.kd))
@@ -558,22 +593,14 @@ class Torques:
         vars(other).pop("moving", None)
         return other
 
-    def with_guesses(
-        self,
-        late_s: Mapping[str, float],
-        centre_m: Mapping[str, Real],
-        forms: Mapping[FormKey, float],
-        explained: Real,
-    ) -> Self:
-        """Give the same with delays, centres of payloads and forms guessed: nothing but their columns changes."""
+    def with_guesses(self, guesses: Guesses, explained: Real) -> Self:
+        """Give the same with other guesses, and what was explained with them: nothing but their columns changes."""
         other = copy(self)
-        object.__setattr__(other, "forms", dict(forms))
+        object.__setattr__(other, "guesses", guesses)
         object.__setattr__(other, "explained", explained)
-        vars(other).pop("rest", None)
-        object.__setattr__(other, "late_s", dict(late_s))
-        object.__setattr__(other, "centre_m", dict(centre_m))
-        # Made for other delays.
-        vars(other).pop("loop", None)
+        # Made for other guesses.
+        for name in ("loop", "rest"):
+            vars(other).pop(name, None)
         return other
 
     def late(self, from_s: float, by_s: float) -> Real:

@@ -16,6 +16,8 @@ from chladni.signals.arrays import Real
 
 #: Of the pose's error under the usual torque of a spring, and of play, before a log is seen: rad (m).
 _GIVES = 0.02
+#: Of its link's inertia: less of a rotor isn't felt.
+LEAST_ROTOR = 0.05
 #: Quantiles of the angle by which a loop is pulled aside at which play is tried.
 _PLAYS = (0.3, 0.5, 0.75)
 AT_LINK, AT_MOTOR = "encoder at the link", "encoder at the motor"
@@ -49,11 +51,9 @@ def _over(joint: RobotJoint) -> str:
 
 def _rotor(torques: Torques, row: int, joint: RobotJoint) -> Number:
     scale = usual(torques, row) / rms(torques.acceleration[row])
-    return Number(
-        name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", scale=scale, least=0.0,
-        # A motor has a rotor, here or in the description.
-        has_to_be=joint.armature == 0.0,
-    )  # fmt: skip
+    # A motor has a rotor, here or in the description.
+    least = 0.0 if joint.armature else LEAST_ROTOR * float(torques.need.inertia[joint.dof, joint.dof])
+    return Number(name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", scale=scale, least=least)
 
 
 def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Real, number: Number) -> Iterator[Term]:

@@ -12,8 +12,8 @@ from chladni.gap.robots.transmission_words import transmissions
 
 Maker = Callable[[Torques], Iterator[Term]]
 #: Words whose columns stay as they are, and those that are made anew for what was found.
-_LASTING: tuple[Maker, ...] = (friction, coupled, springs, inertia, transmissions, drives, readings, bodies)
-_MADE_ANEW: tuple[Maker, ...] = (payloads, delays, ripple)
+_LASTING: tuple[Maker, ...] = (friction, coupled, springs, inertia, transmissions, drives, bodies)
+_MADE_ANEW: tuple[Maker, ...] = (readings, payloads, delays, ripple)
 
 
 def all_terms(torques: Torques) -> list[Term]:
@@ -21,7 +21,7 @@ def all_terms(torques: Torques) -> list[Term]:
     if "terms" not in torques.memory:
         torques.memory["terms"] = [term for make in _LASTING for term in make(torques)]
     terms = [*torques.memory["terms"], *(term for make in _MADE_ANEW for term in make(torques))]
-    found = [_found(terms, key, value) for key, value in torques.forms.items()]
+    found = [_found(terms, key, value) for key, value in torques.guesses.forms.items()]
     return [*terms, *(one for one in found if one is not None)]
 
 
