@@ -159,7 +159,7 @@ def ripple(torques: Torques) -> Iterator[Term]:
     """Torque that is periodic in the angle (cogging, gear mesh), of the periods that the rest holds most of."""
     for row, joint in torques.rows:
         periods, count = _periods(torques, row)
-        name, position = joint.name, torques.fast_position[row]
+        position = torques.fast_position[row]
         number = partial(Number, unit=units(joint)[0], scale=usual(torques, row))
 
         def make(period: float, row: int = row, position: Real = position, number: partial[Number] = number) -> Term:
@@ -187,8 +187,7 @@ def _periods(torques: Torques, row: int) -> tuple[list[float], int]:
         return [], 1
     waves = np.arange(lowest, highest, 2.0 * np.pi / way / _FINE)[: _MOST_WAVES * _FINE]
     # What moves with the joint as other words do is none.
-    smooth = [np.ones_like(q), q, q**2, q**3, torques.velocity[row], torques.acceleration[row], torques.sign[row],
-              torques.drive[row], torques.wanted[row]]  # fmt: skip
+    smooth = [np.ones_like(q), q, q**2, q**3, torques.velocity[row], torques.acceleration[row], torques.sign[row], torques.wanted[row]]  # fmt: skip
     there = torques.moving[row]
     basis, _ = np.linalg.qr(np.array(smooth)[:, there].T)
     turns = torques.waves(row, waves)[:, there]

@@ -38,7 +38,7 @@ def tolerances(torques: Torques) -> tuple[Real, list[str]]:
         # Efforts are sampled while commands are held: always just after a step, or just before it.
         half_s = 0.5 / torques.log.sample_rate_hz
         between = torques.smooth(np.nan_to_num(torques.mean_command(0.0, half_s) - torques.log.command))
-        for row, joint in torques.rows:
+        for row, _ in torques.rows:
             stiffness = torques.kp[row] or usual(torques, row) / rms(
                 torques.position[row] - np.mean(torques.position[row])
             )
