@@ -109,15 +109,23 @@ class Answer:
     def _suggested(self) -> tuple["Weighed", ...]:
         """Those that are more probable than not, and explain more than rounding."""
         return tuple(
-            one for one in self.weighed if one.probability >= NAMED and one.share >= LEAST_SHARE and one.is_told
+            one
+            for one in self.weighed
+            if one.probability >= NAMED and one.share >= LEAST_SHARE and one.is_told and one.is_felt
         )
 
     @cached_property
     def unexplained(self) -> tuple[int, ...]:
         """Rows of joints at which something acts that no word explains."""
         # Where a term isn't named, what it stands for is unknown.
-        doubted = {row for one in self.weighed if one not in self.named and one.gain > TEMPER for row in one.acts}
-        beyond = np.flatnonzero(self._contest.unknowns(self._best) > TEMPER)
+        doubted = {
+            row
+            for one in self.weighed
+            if one not in self.named and one.gain > TEMPER and one.is_felt
+            for row in one.acts
+        }
+        left = self._contest.over_rounding(np.array([one.energy for one in self._best.left]))
+        beyond = np.flatnonzero((self._contest.unknowns(self._best) > TEMPER) & (left > 1.0))
         named = {row for one in self.named for row in one.acts}
         return tuple(sorted({*beyond.tolist(), *(doubted - named)}))
 
@@ -177,6 +185,8 @@ class Weighed:
         Rows of the joints that it changes.
     is_told
         Whether its first number is beyond its uncertainty, and not at the edge of what it can be.
+    is_felt
+        Whether its torque is more than any rigid description rounds.
     nats, gain
         That it's worth beside the others, and beside nothing.
     """
@@ -190,6 +200,7 @@ class Weighed:
     others: tuple[Candidate, ...]
     parameters: dict[str, FittedNumber]
     is_told: bool
+    is_felt: bool
     nats: float
     gain: float
 
@@ -242,6 +253,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
         ),
         parameters=_parameters(solved, place, candidate),
         is_told=_is_told(best, place),
+        is_felt=bool(np.max(contest.over_rounding(contest.added(best, place))) > 1.0),
         nats=best.nats - max(rest.nats, unknown),
         gain=best.nats - rest.nats,
     )
@@ -251,9 +263,8 @@ def _is_told(best: Fit, place: int) -> bool:
     values, deviations = best.values(place)
     term = best.terms[place]
     moved = values - term.nominal
-    # A payload or a tilt may be told by any of its numbers.
     told = (np.abs(moved) > _SIGMAS * deviations) & (moved > term.least + 1e-3 * term.scale)
-    return bool(told[0] if term.rows else np.any(told))
+    return bool(np.any(told))
 
 
 def _candidate(solved: Solved, place: int) -> Candidate:

@@ -345,12 +345,20 @@ class Contest:
         return np.tensordot(fit.numbers, self._blocks[self._chosen(fit.terms)], 1)
 
     def shares(self, fit: Fit, place: int) -> Real:
-        """Give ``[joint]``: power of what a term adds, over that of all that is missing there."""
+        """Give ``[row]``: power of what a term adds, over that of all that is missing there."""
+        return np.asarray(self.added(fit, place) / np.maximum(self._energy, np.maximum(self.count, 1.0)))
+
+    def added(self, fit: Fit, place: int) -> Real:
+        """Give ``[row]``: whitened energy of what a term adds."""
         first = self.within + sum(len(one.scale) for one in fit.terms[:place])
         at = self._places[id(fit.terms[place])]
         numbers = fit.numbers[first : first + at.size]
-        added = np.einsum("p,jpq,q->j", numbers, self._gram[:, at[:, None], at], numbers)
-        return np.asarray(added / np.maximum(self._energy, np.maximum(self.count, 1.0)))
+        return np.asarray(np.einsum("p,jpq,q->j", numbers, self._gram[:, at[:, None], at], numbers))
+
+    def over_rounding(self, energy: Real) -> Real:
+        """Give ``[row]``: RMS torque of a whitened energy, over what a rigid description rounds."""
+        power = energy / np.maximum(self.count, 1.0) * self.torques.noise**2
+        return np.asarray(np.sqrt(power) / np.maximum(self.torques.rounding, 1e-300))
 
     def _chosen(self, terms: Sequence[Term]) -> Index:
         return np.concatenate([np.arange(self.within), *(self._places[id(term)] for term in terms)])

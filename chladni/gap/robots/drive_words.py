@@ -125,7 +125,7 @@ def _gains(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.rows:
         if joint.name in torques.guessed:
             continue
-        damped = torques.kd[row] * torques.velocity[row]
+        damped = torques.damped[row]
         yield Term(
             word="controller_gain", site=joint.name,
             columns=at_row(torques, torques.servo_row(row), torques.answered[row] + damped, damped),

@@ -311,7 +311,7 @@ def _blocks(torques: Torques) -> tuple[list[tuple[int, int]], Mask]:
 
 
 def _runs(torques: Torques, blocks: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    if torques.log.command_kind == "position" and (torques.two_sided or not torques.by_effort):
+    if torques.log.command_kind == "position" and not _by_effort(torques):
         return blocks
     count = max(round(torques.log.sample_rate_hz / torques.cutoff_hz), 2)
     return [(start, min(start + count, b)) for a, b in blocks for start in range(a, b, count)]
@@ -351,7 +351,7 @@ def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -
 
 def _by_effort(torques: Torques) -> bool:
     """Whether runs are driven by efforts: where loops are known they hold the joints near where they were."""
-    return torques.by_effort and not torques.two_sided
+    return torques.by_effort and not (torques.two_sided and bool(np.all(np.isfinite(torques.by_row("kp")))))
 
 
 def _kinds(torques: Torques) -> tuple[str, ...]:

@@ -15,6 +15,8 @@ from chladni.signals.errors import ModelError
 _TOLD_BY = 3.0
 #: Share of a log in which a joint has to move.
 _MOVES = 0.05
+#: Share of an effort's power that a position loop leaves.
+_FOLLOWS = 0.1
 #: Least time by which a loop damps, s: half a millisecond of a digital loop.
 _LEAST_S = 5e-4
 
@@ -23,9 +25,9 @@ Gains = Mapping[str, tuple[float, float]]
 
 
 def unknown_gains(torques: Torques) -> list[str]:
-    """Name joints whose positions are commanded, while neither gains nor efforts say what their drives give."""
+    """Name joints whose positions are commanded by gains that nobody says."""
     log = torques.log
-    if torques.by_effort or log.command is None or log.command_kind != "position":
+    if log.command is None or log.command_kind != "position":
         return []
     stiffness = torques.by_row("kp")
     commanded = np.all(np.isfinite(torques.mean_command(0.0, 0.5 / log.sample_rate_hz)), axis=1)
@@ -37,9 +39,9 @@ def unknown_gains(torques: Torques) -> list[str]:
 
 
 def guessed_gains(torques: Torques, names: list[str]) -> Gains:
-    """Give gains of joints, by least squares of the command's lead over the position.
+    """Give gains of joints, by least squares of the command's lead over the position; none where efforts say another.
 
-    The lead is ``(torque + armature a + damping v + friction sgn v)/kp`` and a constant; the stiffness is what the
+    Efforts that are known are ``kp lead - kd v`` of a position loop. Else the lead is ``(torque + armature a + damping v + friction sgn v)/kp`` and a constant; the stiffness is what the
     torque of the described masses tells. Joints whose load is too small take the mean of all.
 
     Raises
@@ -47,6 +49,8 @@ def guessed_gains(torques: Torques, names: list[str]) -> Gains:
     ModelError
         When no joint's load tells its stiffness.
     """
+    if torques.by_effort:
+        return _by_efforts(torques, names)
     half_s = 0.5 / torques.log.sample_rate_hz
     lead = torques.smooth(torques.mean_command(0.0, half_s) - torques.fast_position)
     found: dict[str, tuple[float, float, float]] = {}
@@ -64,6 +68,21 @@ def guessed_gains(torques: Torques, names: list[str]) -> Gains:
     kp = 1.0 / np.where(compliance > _TOLD_BY * spread, compliance, pooled)
     kd = kp * np.maximum(damps, _LEAST_S)
     return dict(zip(found, zip(kp.tolist(), kd.tolist(), strict=True), strict=True))
+
+
+def _by_efforts(torques: Torques, names: list[str]) -> Gains:
+    lead = np.nan_to_num(torques.log.command if torques.log.command is not None else 0.0) - torques.log.position
+    velocity = torques.fast_velocity if torques.log.velocity is None else torques.log.velocity
+    gains = {}
+    for row, joint in enumerate(torques.joints):
+        effort = torques.fast_drive[row]
+        if joint.name not in names or not effort.any():
+            continue
+        (kp, kd), left = nnls(np.array([lead[row], -np.nan_to_num(velocity[row])]).T, effort)
+        # Loops of another kind, and efforts of another unit than the loop's, are looked at by what they move alone.
+        if kp > 0 and left**2 < _FOLLOWS * float(effort @ effort):
+            gains[joint.name] = kp, max(kd, kp * _LEAST_S)
+    return gains
 
 
 def _leads(torques: Torques, row: int, lead: Real) -> tuple[float, float, float]:

@@ -111,15 +111,16 @@ def solved(torques: Torques, left_out: frozenset[str], progress: Callable[[float
         Words that don't take part.
     """
     names = unknown_gains(torques)
-    if names:
-        torques = _guessing(torques, guessed_gains(torques, names))
+    gains = guessed_gains(torques, names) if names else {}
+    if gains:
+        torques = _guessing(torques, gains)
     if not np.any(torques.driven):
         raise ModelError(
             f"{torques.robot.name}: no gains of its drives, and {torques.log.log} has no measured effort; give kp and kd "
             "under [control] of a robot file, or record efforts"
         )
     found = _without_pushes(torques, left_out, progress)
-    for _ in range(_GUESSES * bool(names)):
+    for _ in range(_GUESSES * bool(gains)):
         gains = {name: (kp[0], kd[0]) for name, (kp, kd) in found.gains().items() if name in torques.guessed}
         before = dict(zip(torques.log.joints, torques.kp.tolist(), strict=True))
         if all(abs(kp / before[name] - 1.0) < _SETTLED_GAIN for name, (kp, _) in gains.items()):

@@ -27,23 +27,23 @@ def tolerances(torques: Torques) -> tuple[Real, list[str]]:
             found.append((f"{joint.name}.friction", tolerance.friction * at_row(torques, row, torques.sign[row])[0]))
         doubts = np.array(torques.gain_doubts(row))
         if doubts[0] > 0 and served:
-            damped = torques.kd[row] * torques.velocity[row]
+            damped = torques.damped[row]
             both = at_row(torques, torques.servo_row(row), torques.answered[row] + damped, damped)
             both *= doubts[:, None, None]
             found += zip((f"{joint.name}.kp", f"{joint.name}.kd"), both, strict=True)
     if served:
         # A digital servo holds what it reads for a period.
         found.append(("loop", -LOOP_S * torques.at_servos(torques.loop)))
-    if torques.by_effort and torques.log.command is not None and torques.log.command_kind == "position":
+    command = torques.log.command if torques.log.command_kind == "position" else None
+    if torques.by_effort and not torques.two_sided and command is not None:
         # Efforts are sampled while commands are held: always just after a step, or just before it.
         half_s = 0.5 / torques.log.sample_rate_hz
-        between = torques.smooth(np.nan_to_num(torques.mean_command(0.0, half_s) - torques.log.command))
+        between = torques.smooth(np.nan_to_num(torques.mean_command(0.0, half_s) - command))
         for row, _ in torques.rows:
             stiffness = torques.kp[row] or usual(torques, row) / rms(
                 torques.position[row] - np.mean(torques.position[row])
             )
-            for there in dict.fromkeys([row, torques.servo_row(row)]):
-                found.append((f"{torques.name_of(there)}.hold", at_row(torques, there, stiffness * between[row])[0]))
+            found.append((f"{torques.joints[row].name}.hold", at_row(torques, row, stiffness * between[row])[0]))
     columns = np.zeros((len(found), *torques.missing.shape))
     for place, (_, column) in enumerate(found):
         columns[place, : len(column)] = column

@@ -355,7 +355,7 @@ class Torques:
     def two_sided(self) -> bool:
         """Whether the log tells commands, efforts and motion: the loops are looked at apart from what they move."""
         servos = self.log.command is not None and self.log.command_kind == "position"
-        return self.by_effort and servos and bool(np.all(np.isfinite(self.by_row("kp"))))
+        return self.by_effort and servos and bool(np.any(np.isfinite(self.by_row("kp"))))
 
     @cached_property
     def gives(self) -> bool:
@@ -453,12 +453,23 @@ class Torques:
     @cached_property
     def answered(self) -> Real:
         """``[joint, coarse]``: what the loops' torque is held against."""
-        return self.drive if self.two_sided else self.wanted
+        return self.smooth(self.fast_drive) if self.two_sided else self.wanted
 
     @cached_property
     def drive(self) -> Real:
-        """``[joint, coarse]``."""
-        return self.smooth(self.fast_drive)
+        """``[joint, coarse]``: what moves the joints."""
+        if not self.two_sided:
+            return self.smooth(self.fast_drive)
+        # An effort is sampled somewhere within a held command, a motion answers to all of it: what the loops make of
+        # the difference is known.
+        mean = self.mean_command(0.0, 0.5 / self.log.sample_rate_hz) - self.fast_position
+        between = self.by_row("kp")[:, None] * mean - self.kd[:, None] * self.fast_velocity - self._served
+        return self.smooth(self.fast_drive + np.nan_to_num(between))
+
+    @cached_property
+    def damped(self) -> Real:
+        """``[joint, coarse]``: what the loops take for speeds."""
+        return self.smooth(self.kd[:, None] * self.loop_velocity)
 
     @cached_property
     def slow(self) -> Real:
@@ -488,7 +499,7 @@ class Torques:
         Where the log tells commands and efforts, further rows, one a joint, hold what the loops asked for beyond that.
         """
         lacks = self.drive - self.wanted
-        return np.concatenate([lacks, self.asked - self.drive]) if self.two_sided else lacks
+        return np.concatenate([lacks, self.asked - self.answered]) if self.two_sided else lacks
 
     @cached_property
     def _steps(self) -> tuple[Real, Real]:
@@ -540,10 +551,15 @@ class Torques:
     @cached_property
     def highest_noise(self) -> Real:
         """``[row]``: the same with what a rigid description rounds."""
+        return np.asarray(np.hypot(self.sensed_noise, self.rounding) + 1e-12)
+
+    @cached_property
+    def rounding(self) -> Real:
+        """``[row]``: torque that no rigid description is right to."""
         usual = np.mean(self.of_joints(self.need.torque) ** 2 + self.drive**2, axis=1) / 2.0
         if self.two_sided:
             usual = np.concatenate([usual, np.mean(self.drive**2, axis=1)])
-        return np.asarray(np.sqrt(self.sensed_noise**2 + _RIGHT**2 * usual) + 1e-12)
+        return np.asarray(_RIGHT * np.sqrt(usual))
 
     @property
     def noise(self) -> Real:

@@ -107,8 +107,9 @@ def test_what_can_not_be_told_is_refused_with_what_to_do(tmp_path: Path) -> None
     command = commands(3.0)
     robot = arm(tmp_path)
     position = run_native(robot, command)
+    still = np.repeat(position[:, :1], position.shape[1], axis=1)
     with pytest.raises(ModelError, match=r"no gains of its drives.*\[control\]"):
-        diagnose_robot(without_servos(robot), joint_log_of(robot, position, command=command))
+        diagnose_robot(without_servos(robot), joint_log_of(robot, still, command=command))
     with pytest.raises(LogError, match="neither commands nor measured efforts"):
         diagnose_robot(robot, joint_log_of(robot, position))
     with pytest.raises(LogError, match="record a longer one"):
@@ -117,15 +118,27 @@ def test_what_can_not_be_told_is_refused_with_what_to_do(tmp_path: Path) -> None
         diagnose_robot(replace(robot, base="floating"), joint_log_of(robot, position, command=command))
 
 
-@pytest.mark.parametrize("unknown", ["servo", "command", "effort"])
+def test_gains_that_nobody_says_are_fitted(tmp_path: Path) -> None:
+    command = commands(SECONDS)
+    position = run_native(arm(tmp_path, "machine/arm.xml", shoulder=' frictionloss="2"'), command)
+    step = 2.0 * np.pi / 2**14
+    robot = without_servos(arm(tmp_path))
+    found = diagnose_robot(robot, joint_log_of(robot, step * np.rint(position / step), command=command))
+    assert named(found) == {("coulomb_friction", "shoulder")}
+    assert found.causes[0].parameters["force"].value == pytest.approx(2.0, rel=0.1)
+    assert found.tuned_parameters["shoulder.kp"].value == pytest.approx(120.0, rel=0.05)
+    assert found.tuned_parameters["elbow.kp"].value == pytest.approx(60.0, rel=0.05)
+    assert found.tuned_parameters["elbow.kp"].nominal is None
+    assert found.gap.by == "windows"
+
+
+@pytest.mark.parametrize("unknown", ["command", "effort"])
 def test_a_joint_whose_drive_is_not_known_takes_nothing_from_the_others(tmp_path: Path, unknown: str) -> None:
     command = commands(SECONDS)
     position = run_native(arm(tmp_path, "machine/arm.xml", shoulder=' frictionloss="2"'), command)
     robot = arm(tmp_path)
     log = joint_log_of(robot, position, command=command)
-    if unknown == "servo":
-        robot = replace(robot, joints=(robot.joints[0], replace(robot.joints[1], servo=None)))
-    elif unknown == "command":
+    if unknown == "command":
         messages = (log.command_messages or ())[:1]
         none = (np.zeros(0), np.zeros(0))
         log = replace(log, command=np.stack([command[0], np.full_like(command[0], np.nan)]),

@@ -186,7 +186,7 @@ def test_a_word_at_its_site_is_read_as_the_law_that_made_the_log(name: str, tmp_
     word, _, variant = name.partition(" ")
     found = [
         term for term in contest.terms
-        if (term.word, term.site) == (word, SITES.get(name, "shoulder")) and variant in ("", term.variant)
+        if (term.word, term.site) == (word, SITES.get(name, "shoulder")) and variant == (term.variant or "")
     ]  # fmt: skip
     read = machine_of(contest, contest.fit(found))
     for each, truth in zip(read.joints, machine.joints, strict=True):
