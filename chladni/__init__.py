@@ -48,6 +48,7 @@ _HOME = {
     "simulate": "chladni.models.integrator.simulate",
     "write_model": "chladni.models.files.model_file",
     "Wish": "chladni.models.analysis.wish",
+    "excite": "chladni.robots.excite",
     "load_robot": "chladni.robots.loading",
     "load_setup": "chladni.io.setup",
     "open": "chladni.io.log",
@@ -94,6 +95,7 @@ __all__ = [
     "coherence",
     "cross_spectra",
     "diagnose_gap",
+    "excite",
     "find_peaks",
     "find_response_peaks",
     "frf",
@@ -142,6 +144,7 @@ if TYPE_CHECKING:
     from chladni.models.effects.attached_effect import attached
     from chladni.models.files.model_file import load_model, write_model
     from chladni.models.integrator.simulate import simulate
+    from chladni.robots.excite import excite
     from chladni.robots.loading import load_robot
     from chladni.signals.channel import Channel
     from chladni.signals.coherence import Coherence

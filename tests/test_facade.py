@@ -11,7 +11,7 @@ SURFACE = {
     "EnhancedFrequencyDomainDecomposition", "EstimateError", "FrequencyDomainDecomposition",
     "FrequencyResponse", "HalfPower", "LogError", "ModeSet", "ModelError", "PolyReferenceLeastSquares",
     "PowerSpectralDensity", "SetupError", "Study", "TimeSeries", "Wish", "analyse", "attached",
-    "coherence", "cross_spectra", "diagnose_gap",
+    "coherence", "cross_spectra", "diagnose_gap", "excite",
     "find_peaks", "find_response_peaks", "frf", "identify_modes", "influence", "load_model", "load_robot",
     "load_setup", "locate_from_levels", "mac",
     "open", "open_log", "optimise", "psd",

@@ -17,6 +17,7 @@ from chladni.cli.blind import blind
 from chladni.cli.compare import compare
 from chladni.cli.convert import convert
 from chladni.cli.demo import demo
+from chladni.cli.excite import excite
 from chladni.cli.frf import frf
 from chladni.cli.gap import gap
 from chladni.cli.influence import influence
@@ -40,7 +41,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (info, psd, frf, modes, view, compare, convert, simulate, influence, gap, bench, demo):
+for command in (info, psd, frf, modes, view, compare, convert, simulate, influence, gap, excite, bench, demo):
     app.command()(command)
 app.add_typer(blind)
 

@@ -29,6 +29,23 @@ def with_settings(model: "Model", settings: Sequence[str]) -> "Model":
     return model.with_values(values) if values else model
 
 
+def named_numbers(texts: Sequence[str], flag: str) -> dict[str, float]:
+    """Read ``NAME=VALUE`` of a flag that may be repeated; a value may carry a unit, and comes in SI.
+
+    Raises
+    ------
+    SetupError
+        When a text is no such pair, or a name is given twice.
+    """
+    values: dict[str, float] = {}
+    for text in texts:
+        name, value = _pair(text, flag)
+        if name in values:
+            raise SetupError(f"{flag} {name} is given twice")
+        values[name] = _number(value, None, f"{flag} {text}")
+    return values
+
+
 def effect_of(text: str, model: "Model") -> "Effect":
     """Read an effect such as ``coulomb_friction@elbow:force=8.1,offset=0.2``, meant for a site of `model`.
 
