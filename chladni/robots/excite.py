@@ -1,7 +1,7 @@
 """Exciting trajectories: motions inside a robot's limits that tell its inertias and friction apart."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -35,6 +35,7 @@ _SHARP = 50.0
 _STEP = 1e-6
 #: Kept away from limits: what lies between the samples of the fine grid (Ehlich & Zeller 1964: 1 - cos(pi/64)).
 _BETWEEN = 1.5e-3
+HARMONICS: Final = 5
 _MOST_HARMONICS, _MOST_SAMPLES = 20, 1_000_000
 #: A period of ten seconds is usual (Swevers et al. 1997).
 _USUAL_HZ = 0.1
@@ -50,7 +51,7 @@ def excite(
     *,
     length_s: float = 10.0,
     rate_hz: float = 250.0,
-    harmonics: int = 5,
+    harmonics: int = HARMONICS,
     base_frequency_hz: float | None = None,
     joints: Iterable[str] = (),
     pose: Mapping[str, float] | None = None,
@@ -109,22 +110,42 @@ def excite(
     True
     """
     chosen = robot if isinstance(robot, Robot) else load_robot(robot, meshes=False)
-    if chosen.base == "floating":
-        raise ModelError(
-            f"{chosen.name}: its base floats, and joints move it; fix it in the description (leave out its free "
-            "joint) and hang the robot up"
-        )
     series = _series(length_s, rate_hz, harmonics, base_frequency_hz)
-    moved, told = moved_joints(chosen, tuple(joints))
-    limits = motion_limits(chosen, moved, pose or {}, Shares(travel=travel, speed=speed, torque=torque))
-    search = _Search(chosen, moved, limits, series)
-    starts = search.random(np.random.default_rng(seed))
+    shares = Shares(travel=travel, speed=speed, torque=torque)
+    search, told = _begun(chosen, series, tuple(joints), pose or {}, shares)
+    starts = search.random(np.random.default_rng(seed), _RANDOM)
     judge = _Judge.of([search.seen(one) for one in starts])
     found = search.optimised(judge, starts, progress or (lambda _: None))
     random = float(np.median([judge.condition(search.seen(one)) for one in starts]))
-    return search.trajectory(
-        found, judge, random, rate_hz, round(length_s * rate_hz) + 1, (*told, *limits.remarks, UNCHECKED)
-    )
+    condition = judge.condition(search.seen(found, fine=True))
+    samples = round(length_s * rate_hz) + 1
+    return replace(
+        search.trajectory(found, rate_hz, samples), condition=condition, random_condition=random,
+        parameters=int(judge.base.size), remarks=(*told, UNCHECKED),
+    )  # fmt: skip
+
+
+def random_motion(
+    robot: Robot, *, length_s: float, rate_hz: float, joints: Iterable[str], pose: Mapping[str, float], shares: Shares
+) -> Trajectory:
+    """Give a motion as `excite` begins with, in no time, without condition numbers; arguments and errors as there."""
+    search, _ = _begun(robot, _series(length_s, rate_hz, HARMONICS, None), tuple(joints), pose, shares)
+    (motion,) = search.random(np.random.default_rng(0), 1)
+    return search.trajectory(motion, rate_hz, round(length_s * rate_hz) + 1)
+
+
+def _begun(
+    robot: Robot, series: FourierSeries, joints: tuple[str, ...], pose: Mapping[str, float], shares: Shares
+) -> "tuple[_Search, tuple[str, ...]]":
+    """Give motions of the joints that were asked for, and sentences on what isn't known."""
+    if robot.base == "floating":
+        raise ModelError(
+            f"{robot.name}: its base floats, and joints move it; fix it in the description (leave out its free "
+            "joint) and hang the robot up"
+        )
+    moved, told = moved_joints(robot, joints)
+    limits = motion_limits(robot, moved, pose, shares)
+    return _Search(robot, moved, limits, series), (*told, *limits.remarks)
 
 
 def _series(length_s: float, rate_hz: float, harmonics: int, base_hz: float | None) -> FourierSeries:
@@ -256,10 +277,10 @@ class _Search:
         torque[self._dofs] += self._friction[self._dofs, None] * np.sign(motion[1])
         return _Seen(columns, torque)
 
-    def random(self, rng: np.random.Generator) -> list[Real]:
+    def random(self, rng: np.random.Generator, count: int) -> list[Real]:
         """Give random motions inside the limits."""
         size = (len(self._moved), self._coarse.shape[1])
-        drawn = [rng.standard_normal(size) for _ in range(_RANDOM)]
+        drawn = [rng.standard_normal(size) for _ in range(count)]
         return [self._inside(one / self._used(one, self._coarse), self._coarse) for one in drawn]
 
     def _used(self, x: Real, basis: Real) -> Real:
@@ -358,10 +379,8 @@ class _Search:
         near = softmax(shares, axis=1)[:, None, None]
         return 1.0 - logsumexp(shares, axis=1) / _SHARP, -self._by_x(near * np.concatenate(slopes))
 
-    def trajectory(
-        self, x: Real, judge: _Judge, random: float, rate_hz: float, samples: int, remarks: tuple[str, ...]
-    ) -> Trajectory:
-        """Give the record of a motion."""
+    def trajectory(self, x: Real, rate_hz: float, samples: int) -> Trajectory:
+        """Give the record of a motion, not yet judged."""
         joints = self._robot.joints
         rows = np.array([one.dof for one in joints])
         coefficients = np.zeros((self._robot.model.nv, 2 * self._series.harmonics))
@@ -371,13 +390,12 @@ class _Search:
         position, velocity, acceleration = np.einsum("jh,dhk->djk", coefficients, self._series.basis(time_s))
         position += self._limits.start[:, None]
         look = self._look(np.stack([position - self._limits.start[:, None], velocity, acceleration])[:, self._dofs])
-        fine = self.seen(x, fine=True)
         return Trajectory(
             robot=self._robot.name, joints=joints, moved=tuple(one.name for one in self._moved),
             sample_rate_hz=rate_hz, position=position[rows], velocity=velocity[rows], acceleration=acceleration[rows],
             torque=look.torque[rows], base_frequency_hz=self._series.base_frequency_hz,
-            harmonics=self._series.harmonics, coefficients=coefficients[rows], condition=judge.condition(fine),
-            random_condition=random, parameters=int(judge.base.size), use=self._use(x, fine.torque), remarks=remarks,
+            harmonics=self._series.harmonics, coefficients=coefficients[rows],
+            use=self._use(x, self.seen(x, fine=True).torque),
         )  # fmt: skip
 
     def _use(self, x: Real, torque: Real) -> tuple[JointUse, ...]:

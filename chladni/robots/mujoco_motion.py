@@ -87,6 +87,16 @@ def tilted(model: Any, axis: int, angle: float) -> Any:
     return other
 
 
+def loaded(model: Any, mass: float) -> Any:
+    """Give the same robot with some mass more at the last link's centre of mass, kg."""
+    import mujoco
+
+    other = copy(model)
+    other.body_mass[-1] += mass
+    mujoco.mj_setConst(other, mujoco.MjData(other))
+    return other
+
+
 def gravity_of(model: Any, tilt: tuple[float, float]) -> Real:
     """Give gravity in the frame of a base that is turned about its x, then its y axis, m/s^2."""
     for axis, angle in enumerate(tilt):

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import Any, Final
 
@@ -113,13 +114,13 @@ class Trajectory(Value):
         Of the series.
     coefficients
         ``[joint, 2 harmonics]``: a, then b, of `FourierSeries`, rad/s (m/s).
-    condition, random_condition
-        Condition number of the regressor of base parameters with this motion; median of random series in the same
-        limits.
-    parameters
-        How many base parameters.
     use
         Of the joints that move.
+    condition, random_condition
+        Condition number of the regressor of base parameters with this motion; median of random series in the same
+        limits. Infinite where nothing was optimised.
+    parameters
+        How many base parameters.
     remarks
         Sentences on what isn't known or checked.
     """
@@ -135,11 +136,11 @@ class Trajectory(Value):
     base_frequency_hz: float
     harmonics: int
     coefficients: Real
-    condition: float
-    random_condition: float
-    parameters: int
     use: tuple[JointUse, ...]
-    remarks: tuple[str, ...]
+    condition: float = inf
+    random_condition: float = inf
+    parameters: int = 0
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self._freeze()

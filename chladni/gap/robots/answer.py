@@ -28,6 +28,7 @@ from chladni.gap.records.diagnosis import (
 )
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forward import Confirmed, confirmed, machine_of
+from chladni.gap.robots.next_measurement import next_measurement
 from chladni.gap.robots.pushes import Push
 from chladni.gap.robots.remarks import pushes_told, remarks_on
 from chladni.gap.robots.search import alternatives
@@ -143,6 +144,12 @@ class Answer:
             return _of_positions(self.solved.torques, self._simulated, named=bool(self.named))
         return _of_torques(self.solved, [one.term for one in self.named])
 
+    def _next_measurement(self, unexplained: Sequence[str]) -> str | None:
+        # What a simulation denies as a whole isn't told apart by its parts.
+        weighed = self.weighed if self.denied is None else ()
+        named = [(self._best.terms.index(one.term), one.candidate, one.share) for one in weighed]
+        return next_measurement(self._contest, self._best, named, unexplained)
+
     def diagnosis(self) -> Diagnosis:
         """Give the record."""
         solved = self.solved
@@ -157,6 +164,7 @@ class Answer:
             left=_where(solved, self._best) if self.verdict == "unknown" else None,
             gap=self.closing,
             tuned_parameters=tuned_parameters(solved),
+            next_measurement=self._next_measurement(joints),
             remarks=remarks_on(solved, joints if self.named else ()),
             advice=_advice(self.verdict, joints, self.denied, self.solved.pushes),
             signals=_signals(solved),

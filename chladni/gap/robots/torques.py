@@ -619,6 +619,12 @@ class Torques:
             vars(other).pop(name, None)
         return other
 
+    def lacking(self, missing: Real) -> Self:
+        """Give the same where ``[joint, coarse]`` is missing."""
+        other = copy(self)
+        vars(other)["missing"] = missing
+        return other
+
     def late(self, from_s: float, by_s: float) -> Real:
         """``[joint, coarse]``: missing torque a second, of commands that come so much later than some delay."""
         step = 1.0 / self.log.sample_rate_hz
