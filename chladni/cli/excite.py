@@ -63,18 +63,22 @@ def excite(
     require_places(reads=[robot], writes={"--out": out, "--json": json})
     to = Output(json)
     from chladni.robots.excite import excite as exciting
+    from chladni.robots.loading import load_robot
+    from chladni.robots.motion_limits import UNIT
     from chladni.robots.trajectory import require_csv, write_trajectory
 
     require_csv(out)
+    described = load_robot(robot, meshes=False)
+    start = named_numbers(pose or (), "--pose", {one.name: UNIT[one.kind] for one in described.joints})
     with to.progress(robot.name) as progress:
         made = exciting(
-            robot,
+            described,
             length_s=length,
             rate_hz=rate,
             harmonics=harmonics,
             base_frequency_hz=base_frequency,
             joints=[one.strip() for one in joints.split(",")] if joints is not None else (),
-            pose=named_numbers(pose or (), "--pose"),
+            pose=start,
             travel=travel,
             speed=speed,
             torque=torque,

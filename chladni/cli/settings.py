@@ -1,6 +1,6 @@
 """``NAME=VALUE`` and ``EFFECT@SITE:NAME=VALUE`` as people write them on a command line."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from chladni.signals.errors import SetupError
@@ -29,20 +29,20 @@ def with_settings(model: "Model", settings: Sequence[str]) -> "Model":
     return model.with_values(values) if values else model
 
 
-def named_numbers(texts: Sequence[str], flag: str) -> dict[str, float]:
+def named_numbers(texts: Sequence[str], flag: str, units: Mapping[str, str]) -> dict[str, float]:
     """Read ``NAME=VALUE`` of a flag that may be repeated; a value may carry a unit, and comes in SI.
 
     Raises
     ------
     SetupError
-        When a text is no such pair, or a name is given twice.
+        When a text is no such pair, a name is given twice, or a unit isn't that of the name.
     """
     values: dict[str, float] = {}
     for text in texts:
         name, value = _pair(text, flag)
         if name in values:
             raise SetupError(f"{flag} {name} is given twice")
-        values[name] = _number(value, None, f"{flag} {text}")
+        values[name] = _number(value, units.get(name), f"{flag} {text}")
     return values
 
 

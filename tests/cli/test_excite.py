@@ -42,6 +42,7 @@ def test_a_table_that_is_read_again_and_what_it_uses(run: Run, tmp_path: Path) -
         (("--out", "motion.csv", "--joints", "wrist"), "has no joint 'wrist'"),
         (("--out", "motion.csv", "--pose", "elbow"), "is not of the form NAME=VALUE"),
         (("--out", "motion.csv", "--pose", "elbow=1", "--pose", "elbow=2"), "--pose elbow is given twice"),
+        (("--out", "motion.csv", "--pose", "elbow=0.2 m"), "'0.2 m' is in m, the parameter in rad"),
         (("--out", "nowhere/motion.csv"), "nowhere"),
     ],
 )
