@@ -229,7 +229,7 @@ def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
     truths = [(doubt.one, one, other), *([] if other is None else [(doubt.other, other, one)])]
     try:
         made = motion.made(robot, min(torques.log.sample_rate_hz, _MOST_HZ))
-        laid = replace(torques, robot=robot, log=_log_of(torques, made))
+        laid = _laid(torques, robot, _log_of(torques, made))
         here = all_terms(laid)
         words = {term.word for fit in (doubt.one, doubt.other) for term in fit.terms}
         left_out = frozenset(term.word for term in here) - words
@@ -242,11 +242,19 @@ def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
     return max(min(ahead), 0.0)
 
 
+def _laid(torques: Torques, robot: Robot, log: JointLog) -> Torques:
+    """Give the torques of another log, with what was guessed of the first one."""
+    return Torques(
+        robot=robot, log=log, cutoff_hz=torques.cutoff_hz, late_s=torques.late_s, centre_m=torques.centre_m,
+        level=torques.level,
+    )  # fmt: skip
+
+
 def _lacking(laid: Torques, missing: Real, made: Trajectory) -> Torques:
     """Give the torques of a machine that lacks ``[row, coarse]`` in the same motion: its drives give that more."""
     time_s = laid.log.time_s
     fast = np.array([np.interp(time_s, time_s[laid.kept], row) for row in missing])
-    return replace(laid, log=_log_of(laid, made, fast)).lacking(laid.missing + missing)
+    return _laid(laid, laid.robot, _log_of(laid, made, fast)).lacking(laid.missing + missing)
 
 
 def _predicted(fit: Fit, here: Sequence[Term]) -> Real:
