@@ -10,7 +10,7 @@ import numpy as np
 
 from chladni.io.log_info import some_of
 from chladni.models.effects.wording import nearest
-from chladni.robots.mujoco_motion import static_torque
+from chladni.robots.mujoco_motion import torque_alone
 from chladni.robots.robot import Robot, RobotJoint
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError, SetupError
@@ -188,7 +188,8 @@ def effort_limit(joint: RobotJoint) -> float:
 
 def _require_held(robot: Robot, start: Real, torque: Real, shares: Shares) -> None:
     """Refuse a start pose that takes nearly all that the drives may give."""
-    needed = np.abs(static_torque(robot.model, start[:, None])[:, 0])
+    still = np.zeros((start.size, 1))
+    needed = np.abs(torque_alone(robot.model, start[:, None], still, still)[:, 0])
     for joint in robot.joints:
         dof = joint.dof
         if needed[dof] > _HOLDS * torque[dof]:

@@ -13,8 +13,9 @@ from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.joint_noise import steps_and_noise
 from chladni.gap.robots.search import alternatives
-from chladni.gap.robots.torques import Torques
-from chladni.gap.robots.words import Term, all_terms
+from chladni.gap.robots.term import Term
+from chladni.gap.robots.torques import FormKey, Torques
+from chladni.gap.robots.words import all_terms
 from chladni.robots.excite import random_motion
 from chladni.robots.joint_log import JointLog
 from chladni.robots.motion_limits import FREE_TURN, USUAL_SPEED, Shares
@@ -151,8 +152,8 @@ def next_measurement(
     if sentences:
         return sentences[0]
     most = np.argsort(-contest.unknowns(best), kind="stable")
-    names = [joint.name for joint in (contest.torques.joints[row] for row in most) if joint.name in unexplained]
-    return _look_first(robot, names)
+    names = dict.fromkeys(contest.torques.name_of(row) for row in most.tolist())
+    return _look_first(robot, [name for name in names if name in unexplained])
 
 
 def _doubt(contest: Contest, best: Fit, place: int, name: Candidate) -> Doubt | None:
@@ -229,12 +230,21 @@ def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
     truths = [(doubt.one, one, other), *([] if other is None else [(doubt.other, other, one)])]
     try:
         made = motion.made(robot, min(torques.log.sample_rate_hz, _MOST_HZ))
-        laid = _laid(torques, robot, _log_of(torques, made))
+        # What laws aren't linear in stays as it was found.
+        forms = {
+            (term.word, term.site, term.variant): term.form_value
+            for fit in (doubt.other, doubt.one)
+            for term in fit.terms
+            if term.form is not None
+        }
+        laid = _laid(torques, robot, _log_of(torques, made), forms)
         here = all_terms(laid)
         words = {term.word for fit in (doubt.one, doubt.other) for term in fit.terms}
         left_out = frozenset(term.word for term in here) - words
         ahead = [
-            _ahead(Contest(_lacking(laid, _predicted(fit, here), made), left_out), fit, own, rival, doubt.beside)
+            _ahead(
+                Contest(_lacking(laid, _predicted(fit, here, laid), made), left_out), fit, own, rival, doubt.beside
+            )
             for fit, own, rival in truths
         ]
     except (ChladniError, KeyError):
@@ -242,11 +252,11 @@ def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
     return max(min(ahead), 0.0)
 
 
-def _laid(torques: Torques, robot: Robot, log: JointLog) -> Torques:
+def _laid(torques: Torques, robot: Robot, log: JointLog, forms: Mapping[FormKey, float]) -> Torques:
     """Give the torques of another log, with what was guessed of the first one."""
     return Torques(
         robot=robot, log=log, cutoff_hz=torques.cutoff_hz, late_s=torques.late_s, centre_m=torques.centre_m,
-        level=torques.level,
+        level=torques.level, forms=forms,
     )  # fmt: skip
 
 
@@ -254,16 +264,17 @@ def _lacking(laid: Torques, missing: Real, made: Trajectory) -> Torques:
     """Give the torques of a machine that lacks ``[row, coarse]`` in the same motion: its drives give that more."""
     time_s = laid.log.time_s
     fast = np.array([np.interp(time_s, time_s[laid.kept], row) for row in missing])
-    return _laid(laid, laid.robot, _log_of(laid, made, fast)).lacking(laid.missing + missing)
+    return _laid(laid, laid.robot, _log_of(laid, made, fast), laid.forms).lacking(laid.missing + missing)
 
 
-def _predicted(fit: Fit, here: Sequence[Term]) -> Real:
+def _predicted(fit: Fit, here: Sequence[Term], laid: Torques) -> Real:
     """``[row, coarse]``: what a set of terms says is missing."""
-    parts = []
+    found = np.zeros_like(laid.missing)
     for place, term in enumerate(fit.terms):
         values, _ = fit.values(place)
-        parts.append(np.tensordot(values - term.nominal, _like(here, term).columns, 1))
-    return np.asarray(np.sum(parts, axis=0)) if parts else np.zeros(here[0].columns.shape[1:])
+        part = np.tensordot(values - term.nominal, _like(here, term).columns, 1)
+        found[: len(part)] += part
+    return found
 
 
 def _ahead(then: Contest, truth: Fit, own: Term, rival: Term | None, beside: Beside) -> float:
@@ -277,18 +288,21 @@ def _ahead(then: Contest, truth: Fit, own: Term, rival: Term | None, beside: Bes
     return best.nats - max(then.fit(one, best).nats for one in (instead, *others))
 
 
-def _log_of(torques: Torques, made: Trajectory, beyond: Real | float = 0.0) -> JointLog:
-    """Lay a motion out as a log like the one at hand; ``[joint, sample]`` is needed beyond the description."""
+def _log_of(torques: Torques, made: Trajectory, beyond: Real | None = None) -> JointLog:
+    """Lay a motion out as a log like the one at hand; ``[row, sample]`` is needed beyond the description."""
     log, rate, rng = torques.log, made.sample_rate_hz, np.random.default_rng(0)
     rows = [[one.name for one in made.joints].index(name) for name in log.joints]
     position, velocity, torque = (values[rows] for values in (made.position, made.velocity, made.torque))
-    torque = torque + beyond
+    if beyond is not None:
+        torque = torque + beyond[: len(rows)]
+    # Rows of loops hold what is asked for beyond what arrives.
+    wanted = torque if beyond is None or len(beyond) == len(rows) else torque + beyond[len(rows) :]
     time_s = np.arange(position.shape[1]) / rate
 
     def noise(density: Real) -> Real:
         return np.sqrt(density * rate / 2.0)[:, None] * rng.standard_normal(position.shape)
 
-    asked = _command(torques, position, velocity, torque)
+    asked = _command(torques, position, velocity, wanted)
     command = None if log.command is None else np.where(_known(log.command), asked, np.nan)
     effort = None
     if log.effort is not None:
@@ -323,11 +337,11 @@ def _command(torques: Torques, position: Real, velocity: Real, torque: Real) -> 
 
 
 def _like(here: Sequence[Term], term: Term) -> Term:
-    """Give the term of the same word, site and form; of the same word and site where forms are each log's own."""
-    same = [one for one in here if one.key == term.key and len(one.scale) == len(term.scale)]
+    """Give the term of the same word, site and kind, of the form that is nearest."""
+    same = [one for one in here if (*one.key, one.variant) == (*term.key, term.variant)]
     if not same:
         raise KeyError(term.key)
-    return next((one for one in same if one.variant == term.variant), same[len(same) // 2])
+    return min(same, key=lambda one: 0.0 if term.form is None else abs(one.form_value - term.form_value))
 
 
 def _sentence(robot: Robot, doubt: Doubt, found: Sequence[tuple[Motion, Design]]) -> str:

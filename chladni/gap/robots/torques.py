@@ -620,8 +620,9 @@ class Torques:
         return other
 
     def lacking(self, missing: Real) -> Self:
-        """Give the same where ``[joint, coarse]`` is missing."""
+        """Give the same where ``[row, coarse]`` is missing."""
         other = copy(self)
+        vars(other).pop("rest", None)
         vars(other)["missing"] = missing
         return other
 
