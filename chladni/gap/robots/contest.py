@@ -13,7 +13,7 @@ from chladni.gap.calibration import ANOTHER, DETAILS, ELSEWHERE, USUAL
 from chladni.gap.records.diagnosis import PARAMETER
 from chladni.gap.robots.term import FOUND, Term
 from chladni.gap.robots.tolerances import tolerances
-from chladni.gap.robots.torques import Torques
+from chladni.gap.robots.torques import RIGHT, Torques
 from chladni.gap.robots.words import all_terms
 from chladni.signals.arrays import Index, Mask, Real
 
@@ -253,6 +253,8 @@ class Contest:
             alone = (log(ANOTHER) - every) * (count - 1)
             shared = log(ANOTHER) - log(comb(self._words[word], count)) if count > 1 else -np.inf
             nats += log(ANOTHER) - every + max(alone, shared)
+        # What machines rarely have is one thing more than what most have.
+        nats += log(ANOTHER) * sum(term.rare for term in terms)
         # A form that was chosen among several was one of them by chance.
         nats -= sum(log(term.form.count) for term in terms if term.form is not None)
         # Tolerances allow for what values are usually wrong by: more is one thing more.
@@ -356,9 +358,10 @@ class Contest:
         return np.asarray(np.einsum("p,jpq,q->j", numbers, self._gram[:, at[:, None], at], numbers))
 
     def over_rounding(self, energy: Real) -> Real:
-        """Give ``[row]``: RMS torque of a whitened energy, over what a rigid description rounds."""
+        """Give ``[row]``: RMS torque of a whitened energy, over what any description of the torque's changes rounds."""
         power = energy / np.maximum(self.count, 1.0) * self.torques.noise**2
-        return np.asarray(np.sqrt(power) / np.maximum(self.torques.rounding, 1e-300))
+        changes = np.resize(np.std(self.torques.drive, axis=1), power.size)
+        return np.asarray(np.sqrt(power) / np.maximum(RIGHT * changes, 1e-300))
 
     def _chosen(self, terms: Sequence[Term]) -> Index:
         return np.concatenate([np.arange(self.within), *(self._places[id(term)] for term in terms)])

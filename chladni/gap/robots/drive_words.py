@@ -118,7 +118,7 @@ def _limits(make: Callable[[float], Term], grid: Real, name: str, unit: str) -> 
 def _of_drive(torques: Torques, row: int, word: str, column: Real) -> Term:
     columns = at_row(torques, row, column)
     site = torques.joints[row % len(torques.joints)].name
-    return Term(word=word, site=site, columns=columns, numbers=(_part(),))
+    return Term(word=word, site=site, columns=columns, numbers=(_part(),), rare=word != "saturation")
 
 
 def _gains(torques: Torques) -> Iterator[Term]:

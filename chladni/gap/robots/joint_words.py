@@ -73,7 +73,7 @@ def _loops(torques: Torques, row: int, joint: RobotJoint, dry: Number) -> Iterat
 
         def make(yields: float, word: str = word, number: Number = number, variant: str | None = variant) -> Term:
             built_up = torques.smooth(_dahl(torques.fast_position[row], yields, torques.stretches))
-            return law(torques, row, word, (built_up,), number, variant=variant)
+            return law(torques, row, word, (built_up,), number, variant=variant, rare=variant is None)
 
         yield from formed(make, np.array(shares) * motion, name="yield", unit=length(joint))
 
@@ -112,7 +112,7 @@ def coupled(torques: Torques) -> Iterator[Term]:
                 columns = at_row(torques, row, column) + sense * at_row(torques, row + 1, column)
                 yield Term(
                     word=word, site=f"{one.name}~{other.name}", columns=columns, numbers=(number,),
-                    rows=(row, row + 1), variant=variant,
+                    rows=(row, row + 1), variant=variant, rare=True,
                 )  # fmt: skip
 
 
@@ -136,7 +136,7 @@ def _stop(torques: Torques, row: int, joint: RobotJoint, side: float, pull: Numb
 
     def make(clearance: float) -> Term:
         pressed = torques.smooth(side * np.maximum(way - clearance, 0.0))
-        return law(torques, row, "one_sided_stop", (pressed,), pull, variant=variant)
+        return law(torques, row, "one_sided_stop", (pressed,), pull, variant=variant, rare=True)
 
     grid = np.quantile(side * torques.position[row], _STOPS)
     if np.any(np.diff(grid) <= 0):
@@ -165,7 +165,7 @@ def ripple(torques: Torques) -> Iterator[Term]:
         def make(period: float, row: int = row, position: Real = position, number: partial[Number] = number) -> Term:
             turns = 2.0 * np.pi / period * position
             columns = (torques.smooth(np.sin(turns)), torques.smooth(np.cos(turns)))
-            return law(torques, row, "ripple", columns, number(name="sine"), number(name="cosine"))
+            return law(torques, row, "ripple", columns, number(name="sine"), number(name="cosine"), rare=True)
 
         way = float(np.ptp(torques.position[row]))
         for place, period in enumerate(periods):

@@ -255,8 +255,8 @@ def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
 def _laid(torques: Torques, robot: Robot, log: JointLog, forms: Mapping[FormKey, float]) -> Torques:
     """Give the torques of another log, with what was guessed of the first one."""
     return Torques(
-        robot=robot, log=log, cutoff_hz=torques.cutoff_hz, late_s=torques.late_s, centre_m=torques.centre_m,
-        level=torques.level, forms=forms,
+        robot=robot, log=log, cutoff_hz=torques.cutoff_hz, guesses=replace(torques.guesses, forms=forms),
+        level=torques.level, guessed=torques.guessed,
     )  # fmt: skip
 
 
@@ -264,7 +264,7 @@ def _lacking(laid: Torques, missing: Real, made: Trajectory) -> Torques:
     """Give the torques of a machine that lacks ``[row, coarse]`` in the same motion: its drives give that more."""
     time_s = laid.log.time_s
     fast = np.array([np.interp(time_s, time_s[laid.kept], row) for row in missing])
-    return _laid(laid, laid.robot, _log_of(laid, made, fast), laid.forms).lacking(laid.missing + missing)
+    return _laid(laid, laid.robot, _log_of(laid, made, fast), laid.guesses.forms).lacking(laid.missing + missing)
 
 
 def _predicted(fit: Fit, here: Sequence[Term], laid: Torques) -> Real:

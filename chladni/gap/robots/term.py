@@ -88,6 +88,8 @@ class Term:
         Of the joints whose law this idealises; none where the physics is exact.
     form
         The number that its columns aren't linear in, if there's one.
+    rare
+        Whether few machines have it.
     reach
         How far the other numbers, as a vector, can lie from the first as its arm: a mass and its first moment.
     """
@@ -100,6 +102,7 @@ class Term:
     variant: str | None = None
     form: Form | None = None
     reach: float | None = None
+    rare: bool = False
 
     @property
     def key(self) -> tuple[str, str]:
@@ -181,10 +184,11 @@ def length(joint: RobotJoint) -> str:
 
 
 def law(
-    torques: Torques, row: int, word: str, columns: tuple[Real, ...], *numbers: Number, variant: str | None = None
-) -> Term:
+    torques: Torques, row: int, word: str, columns: tuple[Real, ...], *numbers: Number, variant: str | None = None,
+    rare: bool = False,
+) -> Term:  # fmt: skip
     """Give a law of one joint."""
     return Term(
         word=word, site=torques.joints[row].name, columns=at_row(torques, row, *columns), numbers=numbers, rows=(row,),
-        variant=variant,
+        variant=variant, rare=rare,
     )  # fmt: skip

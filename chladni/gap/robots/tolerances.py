@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from chladni.gap.robots.term import at_row, usual
-from chladni.gap.robots.torques import Torques, rms
+from chladni.gap.robots.torques import ALL_COMMANDS, Torques, rms
 from chladni.robots.dynamics import inertial_numbers
 from chladni.robots.robot import Robot
 from chladni.signals.arrays import Real
@@ -34,8 +34,11 @@ def tolerances(torques: Torques) -> tuple[Real, list[str]]:
     if served:
         # A digital servo holds what it reads for a period.
         found.append(("loop", -LOOP_S * torques.at_servos(torques.loop)))
+        # Commands wait for the loop's next turn.
+        common = torques.guesses.late_s.get(ALL_COMMANDS, 0.0)
+        found.append(("turn", LOOP_S * torques.at_servos(torques.late(common, 0.0))))
     command = torques.log.command if torques.log.command_kind == "position" else None
-    if torques.by_effort and not torques.two_sided and command is not None:
+    if torques.by_effort and command is not None:
         # Efforts are sampled while commands are held: always just after a step, or just before it.
         half_s = 0.5 / torques.log.sample_rate_hz
         between = torques.smooth(np.nan_to_num(torques.mean_command(0.0, half_s) - command))
@@ -43,7 +46,10 @@ def tolerances(torques: Torques) -> tuple[Real, list[str]]:
             stiffness = torques.kp[row] or usual(torques, row) / rms(
                 torques.position[row] - np.mean(torques.position[row])
             )
-            found.append((f"{torques.joints[row].name}.hold", at_row(torques, row, stiffness * between[row])[0]))
+            name = torques.joints[row].name
+            found.append((f"{name}.hold", at_row(torques, row, stiffness * between[row])[0]))
+            if torques.two_sided:
+                found.append((f"{name}.within", at_row(torques, row, torques.within[row])[0]))
     columns = np.zeros((len(found), *torques.missing.shape))
     for place, (_, column) in enumerate(found):
         columns[place, : len(column)] = column

@@ -30,7 +30,7 @@ _ENDS = 3.0
 #: Least periods of the cutoff in a stretch.
 _LEAST = 12.0
 #: Of the usual torque: what a rigid description is right to, unless a fit leaves less.
-_RIGHT = 0.02
+RIGHT = 0.02
 #: Of its usual speed: within this a joint could move either way, however fine its encoder.
 _STILL = 0.002
 _ORDER = 4
@@ -40,6 +40,8 @@ _LINES, _CLEAR = 64, 0.02
 _TURN = 1e-4
 #: Of a gain that nobody says, over what was guessed.
 _UNKNOWN_GAIN = 0.5
+#: Values from means over cells, of fourth order: 1 - d^2/24 + 3 d^4/640.
+_FROM_MEANS = np.array([9.0, -116.0, 2134.0, -116.0, 9.0]) / 1920.0
 #: A stamp that is just reached counts.
 _TIE_S = 1e-7
 ALL_COMMANDS = "all commands"
@@ -310,13 +312,19 @@ class Torques:
         return self._held(later_s) if self.two_sided else self.mean_command(later_s, half)
 
     def mean_command(self, later_s: float, half_s: float) -> Real:
-        """Give ``[joint, sample]``: the held command's mean over an interval around each sample."""
+        """Give ``[joint, sample]``: what of a held command goes below half the sample rate.
+
+        Means over the samples' intervals, without what a mean takes from slow signals, h^2/24 of their curvature, and
+        so on: values of a function from the means of its cells.
+        """
         found = np.full_like(self._commands, np.nan)
         for row, (starts, values) in self._messages():
             sums = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(starts))])
             at = self.log.time_s - self.robot.delay_s - later_s
             before, after = (_integral(at + side, starts, values, sums) for side in (-half_s, half_s))
             found[row] = (after - before) / (2.0 * half_s)
+        for a, b in self.stretches:
+            found[:, a:b] = correlate1d(found[:, a:b], _FROM_MEANS, axis=1, mode="nearest")
         return found
 
     def _held(self, later_s: float) -> Real:
@@ -453,18 +461,28 @@ class Torques:
     @cached_property
     def answered(self) -> Real:
         """``[joint, coarse]``: what the loops' torque is held against."""
-        return self.smooth(self.fast_drive) if self.two_sided else self.wanted
+        return self.drive if self.two_sided else self.wanted
 
     @cached_property
     def drive(self) -> Real:
-        """``[joint, coarse]``: what moves the joints."""
-        if not self.two_sided:
-            return self.smooth(self.fast_drive)
-        # An effort is sampled somewhere within a held command, a motion answers to all of it: what the loops make of
-        # the difference is known.
-        mean = self.mean_command(0.0, 0.5 / self.log.sample_rate_hz) - self.fast_position
-        between = self.by_row("kp")[:, None] * mean - self.kd[:, None] * self.fast_velocity - self._served
-        return self.smooth(self.fast_drive + np.nan_to_num(between))
+        """``[joint, coarse]``."""
+        return self.smooth(self.fast_drive)
+
+    @cached_property
+    def within(self) -> Real:
+        """``[joint, coarse]``: mean torque less that at the samples, by what the loops make of held commands.
+
+        An effort is sampled somewhere within a held command, a motion answers to all of it.
+        """
+        half_s, between = 0.5 / self.log.sample_rate_hz, np.zeros_like(self.fast_drive)
+        common = self.guesses.late_s.get(ALL_COMMANDS, 0.0)
+        delays = [common + self.guesses.late_s.get(one.name, 0.0) for one in self.joints]
+        for late_s in set(delays):
+            rows = np.array(delays) == late_s
+            between[rows] = (self.mean_command(late_s, half_s) - self._held(late_s))[rows]
+        moved = self.by_row("kp")[:, None] * (between - self.fast_position + self.log.position)
+        moved -= self.kd[:, None] * (self.fast_velocity - self.loop_velocity)
+        return self.smooth(np.nan_to_num(moved))
 
     @cached_property
     def damped(self) -> Real:
@@ -499,7 +517,7 @@ class Torques:
         Where the log tells commands and efforts, further rows, one a joint, hold what the loops asked for beyond that.
         """
         lacks = self.drive - self.wanted
-        return np.concatenate([lacks, self.asked - self.answered]) if self.two_sided else lacks
+        return np.concatenate([lacks, self.asked - self.drive]) if self.two_sided else lacks
 
     @cached_property
     def _steps(self) -> tuple[Real, Real]:
@@ -546,7 +564,7 @@ class Torques:
         # Efforts step with their commands, which is no noise: what loops ask for does so, too.
         differs = self.kp[:, None] * (self._held(0.0) - self.log.position) - self.kd[:, None] * self.loop_velocity
         loops = steps_and_noise(np.nan_to_num(differs) - self.fast_drive, rate, stretches)[1] * self.cutoff_hz
-        return np.sqrt(np.concatenate([found + np.minimum(effort, loops), loops]))
+        return np.asarray(np.sqrt(np.concatenate([found + np.minimum(effort, loops), loops])))
 
     @cached_property
     def highest_noise(self) -> Real:
@@ -559,7 +577,7 @@ class Torques:
         usual = np.mean(self.of_joints(self.need.torque) ** 2 + self.drive**2, axis=1) / 2.0
         if self.two_sided:
             usual = np.concatenate([usual, np.mean(self.drive**2, axis=1)])
-        return np.asarray(_RIGHT * np.sqrt(usual))
+        return np.asarray(RIGHT * np.sqrt(usual))
 
     @property
     def noise(self) -> Real:
@@ -610,12 +628,12 @@ class Torques:
         return other
 
     def with_guesses(self, guesses: Guesses, explained: Real) -> Self:
-        """Give the same with other guesses, and what was explained with them: nothing but their columns changes."""
+        """Give the same with other guesses, and what was explained with them."""
         other = copy(self)
         object.__setattr__(other, "guesses", guesses)
         object.__setattr__(other, "explained", explained)
         # Made for other guesses.
-        for name in ("loop", "rest"):
+        for name in ("loop", "rest", "within"):
             vars(other).pop(name, None)
         return other
 

@@ -69,10 +69,12 @@ def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Re
         loop = torques.kp[row] * ahead + torques.kd[row] * rate
         columns = np.concatenate([at_row(torques, torques.servo_row(row), loop), columns])
         numbers = (number, *numbers)
-    yield Term(word=word, site=joint.name, columns=columns, numbers=numbers, rows=rows, variant=AT_LINK)
+    yield Term(word=word, site=joint.name, columns=columns, numbers=numbers, rows=rows, variant=AT_LINK, rare=True)
     behind = torques.turned(row, -ahead, -rate, -acceleration)
     whole = np.concatenate([-behind[None], at_row(torques, row, torques.acceleration[row])[:, : len(behind)]])
-    yield Term(word=word, site=joint.name, columns=whole, numbers=(number, rotor), rows=(row,), variant=AT_MOTOR)
+    yield Term(
+        word=word, site=joint.name, columns=whole, numbers=(number, rotor), rows=(row,), variant=AT_MOTOR, rare=True
+    )
 
 
 def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
@@ -89,7 +91,13 @@ def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
         turning = torques.acceleration[row] + torques.coarse_rate(torques.coarse_rate(torques.smooth(ahead)))
         columns = np.concatenate([at_row(torques, torques.servo_row(row), pulled), at_row(torques, row, turning)])
         return Term(
-            word="backlash", site=joint.name, columns=columns, numbers=(part, rotor), rows=rows, variant=AT_LINK
+            word="backlash",
+            site=joint.name,
+            columns=columns,
+            numbers=(part, rotor),
+            rows=rows,
+            variant=AT_LINK,
+            rare=True,
         )
 
     grid = 2.0 * np.quantile(np.abs(asked), _PLAYS) / kp
