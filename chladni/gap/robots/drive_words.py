@@ -21,15 +21,11 @@ _MOST_GAIN = -0.9
 
 def drives(torques: Torques) -> Iterator[Term]:
     """Give what drives do otherwise than their servos say."""
-    for row, joint in torques.rows:
+    for row, joint in torques.told_rows:
         # In units of what was asked the motion needs 1/gain times its torque: so no gain explains all by being small.
         over = Number(name="over_gain", unit="1", scale=_GAIN, least=_MOST_GAIN, nominal=1.0)
-        columns = at_row(
-            torques, _limited(torques, row), (torques.answered if torques.gives else torques.wanted)[row]
-        )
-        # Where nobody says a loop's gains there's none that is wrong.
-        if joint.name not in torques.guessed:
-            yield Term(word="gain_error", site=joint.name, columns=columns, numbers=(over,))
+        columns = at_row(torques, _limited(torques, row), (torques.answered if torques.gives else torques.wanted)[row])
+        yield Term(word="gain_error", site=joint.name, columns=columns, numbers=(over,))
         if not torques.by_effort or torques.gives or torques.log.effort_kind != "measured":
             yield from _saturation(torques, row, joint)
             yield from _dead_zone(torques, row, joint)
@@ -43,7 +39,7 @@ def _limited(torques: Torques, row: int) -> int:
 
 
 def _loops(torques: Torques) -> Iterator[Term]:
-    for row, joint in torques.rows:
+    for row, joint in torques.told_rows:
         lagging = torques.smooth(np.gradient(torques.fast_drive[row], 1.0 / torques.log.sample_rate_hz))
         lag = Number(name="time_constant", unit="s", scale=_LAG_S, least=0.0)
         yield Term(
@@ -122,9 +118,7 @@ def _of_drive(torques: Torques, row: int, word: str, column: Real) -> Term:
 
 
 def _gains(torques: Torques) -> Iterator[Term]:
-    for row, joint in torques.rows:
-        if joint.name in torques.guessed:
-            continue
+    for row, joint in torques.told_rows:
         damped = torques.damped[row]
         yield Term(
             word="controller_gain", site=joint.name,

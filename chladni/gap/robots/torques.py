@@ -401,6 +401,11 @@ class Torques:
         """Joints whose drive's torque is known, with their rows."""
         return [(row, joint) for row, joint in enumerate(self.joints) if self.driven[row]]
 
+    @property
+    def told_rows(self) -> list[tuple[int, RobotJoint]]:
+        """The same without those whose gains nobody says: what they do otherwise than they should can't be told."""
+        return [(row, joint) for row, joint in self.rows if joint.name not in self.guessed]
+
     @cached_property
     def driven(self) -> Mask:
         """``[joint]``: whether the torque of its drive is known."""

@@ -42,7 +42,8 @@ def transmissions(torques: Torques) -> Iterator[Term]:
 
 
 def _loop_is_known(torques: Torques, row: int) -> bool:
-    return (torques.two_sided or not torques.by_effort) and bool(torques.kp[row] > 0)
+    said = torques.kp[row] > 0 and torques.joints[row].name not in torques.guessed
+    return (torques.two_sided or not torques.by_effort) and bool(said)
 
 
 def _over(joint: RobotJoint) -> str:
@@ -64,12 +65,14 @@ def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Re
     columns = at_row(torques, row, torques.acceleration[row], acceleration)
     numbers: tuple[Number, ...] = (rotor, both)
     rows = tuple(dict.fromkeys([row, torques.servo_row(row)]))
-    if _loop_is_known(torques, row):
+    known = _loop_is_known(torques, row)
+    if known:
         # The loop works on the motor's angle.
         loop = torques.kp[row] * ahead + torques.kd[row] * rate
         columns = np.concatenate([at_row(torques, torques.servo_row(row), loop), columns])
         numbers = (number, *numbers)
-    yield Term(word=word, site=joint.name, columns=columns, numbers=numbers, rows=rows, variant=AT_LINK, rare=True)
+    if known or torques.by_effort:
+        yield Term(word=word, site=joint.name, columns=columns, numbers=numbers, rows=rows, variant=AT_LINK, rare=True)
     behind = torques.turned(row, -ahead, -rate, -acceleration)
     whole = np.concatenate([-behind[None], at_row(torques, row, torques.acceleration[row])[:, : len(behind)]])
     yield Term(
