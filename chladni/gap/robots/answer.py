@@ -194,7 +194,7 @@ class Weighed:
     is_told
         Whether its first number is beyond its uncertainty, and not at the edge of what it can be.
     is_felt
-        Whether its torque is more than any rigid description rounds.
+        Whether more torque would be missing without it than any rigid description rounds.
     nats, gain
         That it's worth beside the others, and beside nothing.
     """
@@ -246,6 +246,9 @@ def _weighed(solved: Solved, place: int) -> Weighed:
         for one, part in zip(others[1:], weight[3:], strict=True)
         if one.terms[-1].word == term.word and one.terms[-1] in near
     )
+    lost = np.array([one.energy for one in rest.left]) - np.array([one.energy for one in best.left])
+    # What tolerances take over when they're stretched is felt, too.
+    strained = rest.strain - best.strain
     shares = contest.shares(best, place)
     acts = np.flatnonzero(shares > _ACTS * np.max(shares))
     candidate = _candidate(solved, place)
@@ -261,7 +264,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
         ),
         parameters=_parameters(solved, place, candidate),
         is_told=_is_told(best, place),
-        is_felt=bool(np.max(contest.over_rounding(contest.added(best, place))) > 1.0),
+        is_felt=bool(np.max(contest.over_rounding(np.maximum(lost, 0.0))) > 1.0) or strained > TEMPER,
         nats=best.nats - max(rest.nats, unknown),
         gain=best.nats - rest.nats,
     )

@@ -106,6 +106,11 @@ class Fit:
     within: int
     weight: Real
 
+    @property
+    def strain(self) -> float:
+        """Nats by which values stand aside within their tolerances."""
+        return 0.5 * float(np.sum(self.numbers[: self.within] ** 2))
+
     def values(self, place: int) -> tuple[Real, Real]:
         """Numbers of a term and their standard deviations, SI, nominal included."""
         first = self.within + sum(len(one.scale) for one in self.terms[:place])
@@ -348,14 +353,11 @@ class Contest:
 
     def shares(self, fit: Fit, place: int) -> Real:
         """Give ``[row]``: power of what a term adds, over that of all that is missing there."""
-        return np.asarray(self.added(fit, place) / np.maximum(self._energy, np.maximum(self.count, 1.0)))
-
-    def added(self, fit: Fit, place: int) -> Real:
-        """Give ``[row]``: whitened energy of what a term adds."""
         first = self.within + sum(len(one.scale) for one in fit.terms[:place])
         at = self._places[id(fit.terms[place])]
         numbers = fit.numbers[first : first + at.size]
-        return np.asarray(np.einsum("p,jpq,q->j", numbers, self._gram[:, at[:, None], at], numbers))
+        added = np.einsum("p,jpq,q->j", numbers, self._gram[:, at[:, None], at], numbers)
+        return np.asarray(added / np.maximum(self._energy, np.maximum(self.count, 1.0)))
 
     def over_rounding(self, energy: Real) -> Real:
         """Give ``[row]``: RMS torque of a whitened energy, over what any description of the torque's changes rounds."""

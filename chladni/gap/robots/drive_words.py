@@ -24,7 +24,9 @@ def drives(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.told_rows:
         # In units of what was asked the motion needs 1/gain times its torque: so no gain explains all by being small.
         over = Number(name="over_gain", unit="1", scale=_GAIN, least=_MOST_GAIN, nominal=1.0)
-        columns = at_row(torques, _limited(torques, row), (torques.answered if torques.gives else torques.wanted)[row])
+        columns = at_row(
+            torques, _limited(torques, row), (torques.answered if torques.gives else torques.wanted)[row]
+        )
         yield Term(word="gain_error", site=joint.name, columns=columns, numbers=(over,))
         if not torques.by_effort or torques.gives or torques.log.effort_kind != "measured":
             yield from _saturation(torques, row, joint)

@@ -10,8 +10,8 @@ from chladni.robots.dynamics import inertial_numbers
 from chladni.robots.robot import Robot
 from chladni.signals.arrays import Real
 
-#: Half the period of a servo's loop at 1 kHz.
-LOOP_S = 5e-4
+#: Half the period of a loop at 500 Hz, s.
+LOOP_S = 1e-3
 
 
 def tolerances(torques: Torques) -> tuple[Real, list[str]]:

@@ -27,7 +27,9 @@ def transmissions(torques: Torques) -> Iterator[Term]:
     """Springs and play between motors and links."""
     for row, joint in torques.rows:
         soft = Number(name="compliance", unit=_over(joint), scale=_GIVES / usual(torques, row), least=0.0)
-        yield from _between(torques, row, joint, "joint_elasticity", torques.wanted[row], soft)
+        # What motion needs shakes with its encoder, which a law of it would explain: measured torques don't.
+        passed = torques.drive[row] if torques.by_effort else torques.wanted[row]
+        yield from _between(torques, row, joint, "joint_elasticity", passed, soft)
         drive = torques.fast_drive[row]
         if not (drive.min() < 0.0 < drive.max()):
             continue
@@ -72,7 +74,9 @@ def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Re
         columns = np.concatenate([at_row(torques, torques.servo_row(row), loop), columns])
         numbers = (number, *numbers)
     if known or torques.by_effort:
-        yield Term(word=word, site=joint.name, columns=columns, numbers=numbers, rows=rows, variant=AT_LINK, rare=True)
+        yield Term(
+            word=word, site=joint.name, columns=columns, numbers=numbers, rows=rows, variant=AT_LINK, rare=True
+        )
     behind = torques.turned(row, -ahead, -rate, -acceleration)
     whole = np.concatenate([-behind[None], at_row(torques, row, torques.acceleration[row])[:, : len(behind)]])
     yield Term(
