@@ -15,6 +15,8 @@ _LIMITS, _WIDTHS = (0.8, 0.9, 0.96), (0.15, 0.3, 0.5)
 _GAIN, _DELAY_S, _LAG_S = 0.3, 0.01, 0.02
 #: Delays at which their column is tried beside that of a short one.
 _SECANTS_S = (0.01, 0.03)
+#: Of its length: the shortest delay that a secant stands for.
+_OF_SECANT = 0.4
 #: One over a gain, less one, of a drive that gives ten times what it's asked for.
 _MOST_GAIN = -0.9
 
@@ -137,9 +139,11 @@ def delays(torques: Torques) -> Iterator[Term]:
     if torques.log.command_kind != "position" or (torques.by_effort and not torques.two_sided):
         return
     believed, common = torques.robot.delay_s, torques.guesses.late_s.get(ALL_COMMANDS, 0.0)
-    delay = Number(name="delay", unit="s", scale=_DELAY_S, least=-believed, nominal=believed)
-    own = Number(name="delay", unit="s", scale=_DELAY_S, least=-believed - common)
     for secant_s in (None, *_SECANTS_S):
+        # A secant says nothing of delays that are much shorter.
+        least = -np.inf if secant_s is None else _OF_SECANT * secant_s
+        delay = Number(name="delay", unit="s", scale=_DELAY_S, least=max(least, -believed), nominal=believed)
+        own = Number(name="delay", unit="s", scale=_DELAY_S, least=max(least, -believed - common))
         variant = None if secant_s is None else f"over {secant_s:g} s"
         late = torques.late(0.0, common if secant_s is None else secant_s)
         yield Term(

@@ -130,7 +130,7 @@ class _Reading:
 
     def _set_delays(self) -> None:
         late = {term.site: float(values[0]) for term, values in self._terms if term.word == "delay"}
-        common = late.get(ALL_COMMANDS, self._robot.delay_s)
+        common = late.get(ALL_COMMANDS, self._robot.delay_s) + LOOP_S * self._within.get("turn", 0.0)
         for name in self._torques.log.joints:
             delay_s = max(common + late.get(name, 0.0), 0.0)
             self._joints[name] = replace(self._joints[name], delay_s=delay_s)

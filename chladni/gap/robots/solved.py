@@ -15,6 +15,7 @@ from chladni.gap.robots.pushes import Push, price, pushed, pushes_of
 from chladni.gap.robots.search import searched
 from chladni.gap.robots.term import SENSES, Term
 from chladni.gap.robots.told import TOLD, Numbers
+from chladni.gap.robots.tolerances import LOOP_S
 from chladni.gap.robots.torques import ALL_COMMANDS, FormKey, Guesses, Torques
 from chladni.signals.errors import ModelError
 
@@ -60,7 +61,11 @@ class Solved:
         """Value, standard deviation and unit of a term's numbers, as they're told."""
         term = self.best.terms[place]
         values, deviations = self.best.values(place)
-        if term.word in TOLD:
+        if (term.word, term.site) == ("delay", ALL_COMMANDS):
+            # Where commands wait for the loop's turn, too, is the whole delay.
+            turn = LOOP_S * float(self.best.numbers[self.contest.tolerated.index("turn")])
+            found = {"delay": (float(values[0]) + turn, float(deviations[0]), "s")}
+        elif term.word in TOLD:
             found = TOLD[term.word](term, values, deviations)
         else:
             gain = self._gain(term)
