@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from chladni.gap.calibration import CLOSE, COVERAGE, LAPSE, LEAST_SHARE, NAMED, TEMPER
-from chladni.gap.comparison.shares import band_shares, gap_map, regime_shares, relative_residual
+from chladni.gap.comparison.shares import band_shares, regime_shares, relative_residual
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.records.diagnosis import (
     PARAMETER,
@@ -19,7 +19,6 @@ from chladni.gap.records.diagnosis import (
     Closing,
     Diagnosis,
     FittedNumber,
-    GapSignals,
     HeldOut,
     Ranked,
     SiteShare,
@@ -28,6 +27,7 @@ from chladni.gap.records.diagnosis import (
 )
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forward import Confirmed, confirmed, machine_of
+from chladni.gap.robots.pictures import joint_motion, torque_maps, torque_signals
 from chladni.gap.robots.remarks import remarks_on
 from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.solved import Solved
@@ -76,10 +76,15 @@ class Answer:
         return () if self.denied is not None else self._suggested
 
     @cached_property
-    def _simulated(self) -> Confirmed | None:
-        """What simulation says of the names that torques suggest; None where it can't be run, or runs go astray."""
+    def _run(self) -> Confirmed | None:
+        """What simulation says of the names that torques suggest; None where it can't be run."""
         best = self._contest.fit([one.term for one in self._suggested])
-        found = confirmed(Solved(contest=self._contest, best=best))
+        return confirmed(Solved(contest=self._contest, best=best))
+
+    @cached_property
+    def _simulated(self) -> Confirmed | None:
+        """The same; None where runs go astray, too."""
+        found = self._run
         return found if found is not None and np.all(np.isfinite([found.before, found.tuned, found.after])) else None
 
     @cached_property
@@ -122,6 +127,7 @@ class Answer:
         """Give the record."""
         solved = self.solved
         joints = [solved.torques.joints[row].name for row in self.unexplained]
+        told = self._contest.fit([one.term for one in self.named])
         return Diagnosis(
             model=solved.torques.robot.name,
             logs=(solved.torques.log.log,),
@@ -134,8 +140,10 @@ class Answer:
             tuned_parameters=tuned_parameters(solved),
             remarks=remarks_on(solved, joints if self.named else ()),
             advice=_advice(self.verdict, joints, self.denied),
-            signals=_signals(solved),
-            machine=machine_of(self._contest, self._contest.fit([one.term for one in self.named])),
+            signals=torque_signals(solved.torques, self._contest.explained(told)),
+            machine=machine_of(self._contest, told),
+            motion=joint_motion(solved.torques, self._run, named=bool(self.named)),
+            torque_maps=torque_maps(self._contest, self._best, [one.term for one in self.named]),
             answer_set=tuple(dict.fromkeys(each for one in self.weighed for each in (one.candidate, *one.others))),
             coverage=COVERAGE,
         )
@@ -375,30 +383,6 @@ def _held_out(torques: Torques, at_s: Real, rate_hz: float) -> tuple[HeldOut, ..
 
 def _every_other(count: int) -> Mask:
     return np.asarray(np.arange(count) * _BLOCKS // count % 2 == 1)
-
-
-def _signals(solved: Solved) -> GapSignals:
-    """Torques of the drives beside what the motion needs: as described, and with what was found."""
-    torques, contest = solved.torques, solved.contest
-    after = torques.drive - (torques.missing - contest.explained(solved.best))
-    rate = torques.rate_hz
-    lines = torques.drive.shape[1] // 2 + 1
-    time_s, frequency_hz, density = gap_map(torques.missing, torques.drive, rate)
-    return GapSignals(
-        log=torques.log.log,
-        sample_rate_hz=rate,
-        output_names=tuple(one.name for one in torques.joints),
-        output_units=tuple("N m" if one.kind == "hinge" else "N" for one in torques.joints),
-        measured=torques.drive,
-        before=torques.wanted,
-        after=after,
-        noise_rms=torques.noise,
-        noise_density=np.repeat((torques.noise**2 / (rate / 2.0))[:, None], lines, axis=1),
-        map_time_s=time_s,
-        map_frequency_hz=frequency_hz,
-        gap_map=density,
-        gap_map_after=gap_map(torques.drive - after, torques.drive, rate)[2],
-    )
 
 
 def _advice(verdict: Verdict, joints: Sequence[str], denied: Confirmed | None) -> str | None:
