@@ -153,7 +153,8 @@ def parameter_table(found: Diagnosis) -> Table:
     rows = [
         (name, _nominal(number), engineering(number.value, number.std, number.unit), _change(number))
         for name, number in found.tuned_parameters.items()
-        if number.std is None or _has_moved(number)
+        # Of a robot's many links it's no news that a log doesn't tell the masses.
+        if _has_moved(number) or (number.std is None and found.machine is None)
     ]
     return ("Parameter", "Nominal", "Tuned", "Change"), rows
 

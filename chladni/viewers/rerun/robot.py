@@ -25,7 +25,8 @@ LINK: Colour = (150, 152, 158)
 NOT_ASKED: Colour = (105, 105, 105)
 #: Of 255: a ghost lets the measured robot through.
 GHOST = 70
-#: Over the robot's size: how far away it is looked at from, alone and in a view half as wide; half the length and the radius of a joint.
+#: Over the robot's size: how far away it is looked at from, alone and in a view half as wide; half the length and the
+#: radius of a joint.
 DISTANCE, BESIDE, JOINT_LENGTH, JOINT_RADIUS = 0.75, 1.1, 0.06, 0.022
 DIRECTION = np.array([0.75, -1.0, 0.45])
 #: More names than this hide the robot; the others are told under the pointer.

@@ -42,7 +42,7 @@ class WebViewer:
 
 
 def serve_web(study: Study, *, port: int = 0) -> WebViewer:
-    """Serve a study to a browser on this computer, bound to loopback only; arguments and errors as of `serve_drawing`.
+    """Serve a study to a browser on this computer; what it gives and raises is as of `serve_drawing`.
 
     Parameters
     ----------
