@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from chladni.robots.shapes import Shape
+from chladni.robots.shapes import Kind, Shape
 from chladni.signals.arrays import Real
 
 #: A scanned robot has more; what shows it needs no more.
@@ -69,8 +69,10 @@ def _shape(model: Any, geom: int, link: int) -> Shape | None:
         )  # fmt: skip
     if kind == int(kinds.mjGEOM_SPHERE):
         return Shape(link=link, kind="ellipsoid", size=np.full(3, size[0]), place=place, turn=turn)
-    names = {kinds.mjGEOM_ELLIPSOID: "ellipsoid", kinds.mjGEOM_BOX: "box", kinds.mjGEOM_CAPSULE: "capsule",
-             kinds.mjGEOM_CYLINDER: "cylinder"}  # fmt: skip
+    names: dict[Any, Kind] = {
+        kinds.mjGEOM_ELLIPSOID: "ellipsoid", kinds.mjGEOM_BOX: "box", kinds.mjGEOM_CAPSULE: "capsule",
+        kinds.mjGEOM_CYLINDER: "cylinder",
+    }  # fmt: skip
     # Planes and height fields are the world's.
     name = next((name for one, name in names.items() if int(one) == kind), None)
     return None if name is None else Shape(link=link, kind=name, size=size, place=place, turn=turn)

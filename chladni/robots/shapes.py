@@ -10,6 +10,8 @@ from chladni.robots.robot import Robot
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.value import Value
 
+Kind = Literal["box", "ellipsoid", "capsule", "cylinder", "mesh"]
+
 #: Of a link without a shape: its own ellipsoid is no larger than so much of its reach, since inertias of descriptions
 #: are often wrong, and its bones are so thick.
 _MOST, _BONE = 0.6, 0.06
@@ -36,7 +38,7 @@ class Shape(Value):
     """
 
     link: int
-    kind: Literal["box", "ellipsoid", "capsule", "cylinder", "mesh"]
+    kind: Kind
     size: Real
     place: Real
     turn: Real

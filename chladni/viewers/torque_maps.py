@@ -4,6 +4,7 @@ import numpy as np
 
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.records.robot import Over, TorqueMap
+from chladni.signals.arrays import Index
 
 #: A few wild samples of a differentiated motion must not flatten all others.
 SHOWN, ROOM = 99.0, 1.15
@@ -31,3 +32,9 @@ def torque_range(one: TorqueMap) -> tuple[float, float]:
 def load_reach(one: TorqueMap) -> float:
     """Load that has full colour."""
     return float(np.percentile(np.abs(one.load), SHOWN)) or 1.0
+
+
+def turns_of(one: TorqueMap) -> Index:
+    """Bins at which a line over them breaks: where the motion turns, friction jumps."""
+    none = np.zeros(0, dtype=np.intp)
+    return np.flatnonzero(np.diff(np.sign(one.centre))) + 1 if one.over == "velocity" else none

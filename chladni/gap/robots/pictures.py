@@ -130,12 +130,12 @@ class _Maps:
             return
         speed = torques.velocity[row]
         described = joint.friction * torques.sign[row] + joint.damping * speed
-        for over, motion, has in (("velocity", speed, described), ("position", torques.position[row], 0.0 * speed)):
-            laws = [
-                one
-                for one in self._laws
-                if one[0].rows == (row,) and (one[0].word in _BY_SPEED) == (over == "velocity")
-            ]
+        courses: tuple[tuple[Over, Real, Real], ...] = (
+            ("velocity", speed, described), ("position", torques.position[row], np.zeros_like(speed)),
+        )  # fmt: skip
+        own = [one for one in self._laws if one[0].rows == (row,)]
+        for over, motion, has in courses:
+            laws = [one for one in own if (one[0].word in _BY_SPEED) == (over == "velocity")]
             yield self._map(joint.name, over, row, motion, has, laws)
 
     def _of_pair(self, term: Term) -> TorqueMap:

@@ -1,6 +1,7 @@
 """Figures of a diagnosed robot, small and many: torque that is missing, friction maps, errors of the motion."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,6 +11,7 @@ from matplotlib.figure import Figure
 
 from chladni.gap.records.diagnosis import GapSignals
 from chladni.gap.records.robot import JointMotion, Over, TorqueMap
+from chladni.signals.arrays import Real
 from chladni.viewers.drawing import thin, with_breaks
 from chladni.viewers.engineering import axis_scale, percent
 from chladni.viewers.figures.gap_signals import AFTER, BEFORE, LEGEND
@@ -18,7 +20,7 @@ from chladni.viewers.figures.sheet import look, plain
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.restoring_force import spread_over
 from chladni.viewers.style import AMPLITUDES, amplitude_colours
-from chladni.viewers.torque_maps import load_reach, map_title, maps_over, torque_range
+from chladni.viewers.torque_maps import load_reach, map_title, maps_over, torque_range, turns_of
 
 #: Of a pane that is a third of the sheet wide.
 COLUMNS, HEIGHT_IN, MOST = 3, 1.25, 12
@@ -86,8 +88,8 @@ def _multiples(
             for axes, row in zip(stack, rows, strict=True):
                 draw(axes, row)
                 axes.tick_params(labelsize=6.5)
-                axes.yaxis.label.set_size(7)
-                axes.xaxis.label.set_size(7)
+                axes.yaxis.label.set_fontsize(7)
+                axes.xaxis.label.set_fontsize(7)
             # Of the pane that has most of them: one may lack a law.
             handles, labels = max((one.get_legend_handles_labels() for one in stack), key=lambda one: len(one[1]))
             figure.legend(handles, labels, loc="outside upper left", **LEGEND)
@@ -156,8 +158,7 @@ def _map(axes: Axes, one: TorqueMap) -> None:
     axes.set_ylabel(f"[{y_unit}]", labelpad=1)
 
 
-def _broken(axes: Axes, one: TorqueMap, values: Sequence[float], across: float, **options: object) -> None:
+def _broken(axes: Axes, one: TorqueMap, values: Real, across: float, **options: Any) -> None:
     """Draw a line over the bins, broken where the motion turns: friction jumps there."""
-    turn = np.flatnonzero(np.diff(np.sign(one.centre))) + 1 if one.over == "velocity" else np.zeros(0, dtype=np.intp)
-    x, y = with_breaks(one.centre / across, np.asarray(values), turn)
+    x, y = with_breaks(one.centre / across, values, turns_of(one))
     axes.plot(x, y, **options)

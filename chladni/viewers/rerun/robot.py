@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -27,10 +28,10 @@ NOT_ASKED: Colour = (105, 105, 105)
 GHOST = 70
 #: Over the robot's size: how far away it is looked at from, alone and in a view half as wide; half the length and the
 #: radius of a joint.
-DISTANCE, BESIDE, JOINT_LENGTH, JOINT_RADIUS = 0.75, 1.1, 0.06, 0.022
+DISTANCE, BESIDE, JOINT_LENGTH, JOINT_RADIUS = 0.65, 1.2, 0.06, 0.022
 DIRECTION = np.array([0.75, -1.0, 0.45])
 #: More names than this hide the robot; the others are told under the pointer.
-NAMES_SHOWN = 6
+NAMES_SHOWN = 4
 
 
 def draw_robot(recording: rr.RecordingStream, scene: RobotScene, *, after: str) -> list[rrb.View]:
@@ -40,15 +41,15 @@ def draw_robot(recording: rr.RecordingStream, scene: RobotScene, *, after: str) 
     _joints(recording, scene)
     views = []
     ghosts = (
-        ("before", scene.before, BEFORE_ON_DARK, "as described", "orange"),
-        ("after", scene.after, AFTER_ON_DARK, f"simulated {after}", "blue"),
+        ("before", scene.before, BEFORE_ON_DARK, "As described", "orange"),
+        ("after", scene.after, AFTER_ON_DARK, after.capitalize(), "blue"),
     )
     for what, poses, colour, told, name in ghosts:
         if poses is not None:
             _pose(recording, what, scene, poses)
             _shapes(recording, what, scene.shapes, colour, ghost=True)
-            views.append(_view(scene, f"{told[0].upper()}{told[1:]} ({name}) and measured (grey)", what))
-    return views or [_view(scene, "Measured: no simulation holds", None)]
+            views.append(_view(scene, f"{told} ({name})", what))
+    return views or [_view(scene, "Measured; no simulation holds", None)]
 
 
 def _pose(recording: rr.RecordingStream, what: str, scene: RobotScene, poses: Poses) -> None:
@@ -84,13 +85,15 @@ def _archetypes(
     paint = (*colour, GHOST) if ghost else colour
     if kind == "mesh":
         for one in group:
+            if one.vertices is None:
+                continue
             mesh = rr.Mesh3D(vertex_positions=one.vertices, triangle_indices=one.faces, albedo_factor=paint)
             place = rr.InstancePoses3D(translations=[one.place], quaternions=[one.turn])
             yield mesh, place
         return
     sizes, places, turns = (np.array([getattr(one, name) for one in group]) for name in ("size", "place", "turn"))
     fill = rr.components.FillMode.TransparentFillMajorWireframe if ghost else rr.components.FillMode.Solid
-    look = {"colors": [paint], "fill_mode": fill, "quaternions": turns}
+    look: dict[str, Any] = {"colors": [paint], "fill_mode": fill, "quaternions": turns}
     match kind:
         case "box":
             yield (rr.Boxes3D(half_sizes=sizes, centers=places, **look),)
@@ -154,7 +157,7 @@ def draw_positions(recording: rr.RecordingStream, motion: JointMotion, *, after:
     )
     # A gap and a new start of the simulation are no motion.
     seconds, breaks = motion.time_s, np.array(motion.gaps, dtype=np.intp) + 1
-    views = []
+    views: list[rrb.View] = []
     for row, name in enumerate(motion.joints):
         path = folder("positions", str(row + 1))
         for place, (what, values, colour, width) in enumerate(lines):

@@ -16,13 +16,13 @@ from chladni.viewers.rerun.canvas import Canvas, draw_labels
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.restoring_force import spread_over
 from chladni.viewers.style import Colour, amplitude_colours
-from chladni.viewers.torque_maps import load_reach, map_title, maps_over, torque_range
+from chladni.viewers.torque_maps import load_reach, map_title, maps_over, torque_range, turns_of
 
 WIDTH, HEIGHT, MARGIN = 460.0, 300.0, 0.05
 MEAN_COLOUR: Colour = (255, 255, 255)
 LOAD_COLOUR: Colour = (170, 170, 170)
 #: Where the words of the legend stand, over the frame's width, and above the frame.
-LEGEND, ABOVE = (0.05, 0.38, 0.72, 0.92), 32.0
+LEGEND, ABOVE = (0.08, 0.34, 0.62, 0.9), 34.0
 #: More in one view are too small to be read.
 TOGETHER = 6
 
@@ -60,7 +60,7 @@ def _draw(recording: rr.RecordingStream, one: TorqueMap, path: str) -> rrb.View:
         radii=rr.Radius.ui_points(1.4),
     )
     recording.log(f"{path}/samples", dots, static=True)
-    told = [("mean", MEAN_COLOUR), ("dots: blue to orange by load", LOAD_COLOUR)]
+    told = [("mean", MEAN_COLOUR), ("dots by load", LOAD_COLOUR)]
     if one.over == "velocity":
         _line(recording, f"{path}/described", canvas, one, one.described / up, across, BEFORE_ON_DARK)
         told.append(("described", BEFORE_ON_DARK))
@@ -71,7 +71,7 @@ def _draw(recording: rr.RecordingStream, one: TorqueMap, path: str) -> rrb.View:
     # In a row above the frame: titles of views are cut off where there are many.
     places = np.column_stack([WIDTH * np.array(LEGEND[: len(told)]), np.full(len(told), -ABOVE)])
     draw_labels(recording, f"{path}/legend", places, [text for text, _ in told], colours=[paint for _, paint in told])
-    return canvas.view(path, f"{map_title(one)} [{y_unit}]", above=2 * ABOVE)
+    return canvas.view(path, f"{map_title(one)} [{y_unit}]", above=3 * ABOVE)
 
 
 def _padded(x: Real) -> tuple[float, float]:
@@ -91,8 +91,7 @@ def _line(
     colour: Colour,
 ) -> None:
     """Draw a line over the bins, broken where the motion turns: friction jumps there."""
-    turns = np.flatnonzero(np.diff(np.sign(one.centre))) + 1 if one.over == "velocity" else []
-    edges = [0, *turns, one.centre.size]
+    edges = [0, *turns_of(one).tolist(), one.centre.size]
     strips = [canvas.places(one.centre[a:b] / across, values[a:b]) for a, b in pairwise(edges) if b > a + 1]
     recording.log(path, rr.LineStrips2D(strips, colors=[colour], radii=rr.Radius.ui_points(1.0)), static=True)
 
