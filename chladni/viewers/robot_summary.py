@@ -67,7 +67,7 @@ def robot_sentences(found: Diagnosis) -> Iterator[str]:
 
 def robot_unknown(found: Diagnosis) -> Iterator[str]:
     """Say where the torque is missing that no word explains, and what torques alone suggest."""
-    gap, where = found.gap, found.left or found.where
+    gap, where = found.gap, found.where
     errs = "torques" if gap.by == "torque" else "simulated positions"
     if gap.tuned > 1.0 and gap.by != "torque":
         yield "Something is missing that no word explains: simulated positions err by more than the motion itself."
