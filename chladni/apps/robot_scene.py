@@ -1,11 +1,13 @@
 """The robot that was diagnosed, to be looked at in motion."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.robots.loading import load_robot
 from chladni.robots.robot import Robot
-from chladni.robots.shapes import forward_kinematics, joint_places, shapes_of
+from chladni.robots.shapes import Shape, forward_kinematics, joint_places, shapes_of
 from chladni.signals.errors import ModelError
 from chladni.viewers.robot_scene import RobotScene
 
@@ -23,9 +25,13 @@ def robot_scene(found: Diagnosis) -> RobotScene | None:
     )
     shares = {one.name: one.share for one in found.where.sites}
     joints = joint_places(robot)
-    low, high = measured.place.min(axis=(0, 1)), measured.place.max(axis=(0, 1))
+    shapes = shapes_of(robot)
+    # What no joint moves, such as a target or a table, may stand anywhere.
+    links = sorted({one.link for one in joints})
+    moved, around = measured.place[:, links], np.array([_reach(shapes, link) for link in links])[:, None]
+    low, high = (moved - around).min(axis=1), (moved + around).max(axis=1)
     return RobotScene(
-        shapes=shapes_of(robot),
+        shapes=shapes,
         joints=joints,
         share=np.array([shares.get(one.name, np.nan) for one in joints]),
         time_s=motion.time_s,
@@ -33,9 +39,14 @@ def robot_scene(found: Diagnosis) -> RobotScene | None:
         measured=measured,
         before=before,
         after=after,
-        size=float(np.linalg.norm(high - low)) or 1.0,
-        centre=(low + high) / 2.0,
+        size=float(np.linalg.norm(high - low, axis=1).max()) or 1.0,
+        centre=np.mean((low + high) / 2.0, axis=0),
     )
+
+
+def _reach(shapes: Sequence[Shape], link: int) -> float:
+    """How far the shapes of a link reach from its origin at most, m."""
+    return max((float(np.linalg.norm(one.place)) + one.radius for one in shapes if one.link == link), default=0.0)
 
 
 def _with_meshes(robot: Robot) -> Robot:

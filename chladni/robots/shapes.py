@@ -48,6 +48,13 @@ class Shape(Value):
     def __post_init__(self) -> None:
         self._freeze()
 
+    @property
+    def radius(self) -> float:
+        """How far it reaches from its middle at most, m."""
+        if self.vertices is not None:
+            return float(np.linalg.norm(self.vertices, axis=1).max(initial=0.0))
+        return float(self.size[:2].sum() if self.kind == "capsule" else np.linalg.norm(self.size))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointPlace(Value):

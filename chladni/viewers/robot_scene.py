@@ -22,7 +22,7 @@ class RobotScene(Value):
     measured, before, after
         Poses of all links; the last two are None where no simulation holds.
     size, centre
-        Reach of the robot, m, and the middle of all that it does ``[3]``, for the eye.
+        Length across the robot with its shapes, m, and its middle ``[3]``, for the eye.
     """
 
     shapes: tuple[Shape, ...]

@@ -28,7 +28,7 @@ NOT_ASKED: Colour = (105, 105, 105)
 GHOST = 70
 #: Over the robot's size: how far away it is looked at from, alone and in a view half as wide; half the length and the
 #: radius of a joint.
-DISTANCE, BESIDE, JOINT_LENGTH, JOINT_RADIUS = 0.65, 1.2, 0.06, 0.022
+DISTANCE, BESIDE, JOINT_LENGTH, JOINT_RADIUS = 0.42, 0.58, 0.04, 0.016
 DIRECTION = np.array([0.75, -1.0, 0.45])
 #: More names than this hide the robot; the others are told under the pointer.
 NAMES_SHOWN = 4
