@@ -92,7 +92,8 @@ def telling_stretch(signals: GapSignals, spectra: GapSpectra | None) -> tuple[fl
     # Sums over every stretch of that length at once, as differences of the running sum.
     total = np.concatenate([[0.0], np.cumsum(np.sum(errors**2, axis=0))])
     first = int(np.argmax(total[length:] - total[:-length]))
-    return first / signals.sample_rate_hz, (first + length) / signals.sample_rate_hz
+    start_s = float(signals.seconds[first])
+    return start_s, start_s + length / signals.sample_rate_hz
 
 
 def _typical_hz(spectra: GapSpectra) -> float:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from chladni.robots.machine import Machine
     from chladni.robots.robot import Robot
     from chladni.viewers.gap_evidence import GapEvidence
+    from chladni.viewers.robot_scene import RobotScene
+    from chladni.viewers.structure_sketch import StructureSketch
 
 Files = Annotated[
     list[Path],
@@ -95,12 +97,17 @@ def gap(
     figure: Sheet = None,
     figures: options.Figures = None,
     save: Recording = None,
+    web: Annotated[
+        bool, typer.Option("--web", help="Serve the pictures to a browser on this computer only.")
+    ] = False,
     write_model: ExplainedModel = None,
     state: State = None,
     command: Command = None,
 ) -> None:
     """Where a model and a log disagree, which effect was left out, and how far the gap closes with it."""
-    wanted = _Wanted(json=json, report=report, figure=figure, figures=figures, save=save, write_model=write_model)
+    wanted = _Wanted(
+        json=json, report=report, figure=figure, figures=figures, save=save, web=web, write_model=write_model
+    )
     # A diagnosis takes its time: it shouldn't be lost to a misspelt folder.
     from chladni.apps.sources import Span
 
@@ -135,18 +142,25 @@ class _Wanted:
     figure: Path | None
     figures: Path | None
     save: Path | None
+    web: bool
     write_model: Path | None
 
     def require_places(self, reads: "Sequence[Path | None]") -> None:
         """Refuse files that can't be written, before anything is computed."""
+        if self.save is not None and self.web:
+            from chladni.signals.errors import SetupError
+
+            raise SetupError("--save writes a file and --web serves a page; give one of them")
         require_places(
             reads=reads, writes={"--json": self.json, **self._files()}, folders={"--figures": self.figures}
         )
 
     def of_a_model(self) -> list[str]:
         """Options that ask for a file which only a model gives."""
-        given = {"--figure": self.figure, "--save": self.save, "--write-model": self.write_model}
-        return [name for name, path in given.items() if path is not None]
+        given = {
+            "--figure": self.figure, "--save": self.save, "--web": self.web or None, "--write-model": self.write_model
+        }  # fmt: skip
+        return [name for name, asked in given.items() if asked is not None]
 
     def _files(self) -> dict[str, Path | None]:
         return {
@@ -249,6 +263,9 @@ def _diagnose(
     _draw(out, found, model, wanted)
     if wanted.write_model is not None:
         _write_explained(out, found, model, wanted.write_model)
+    # Last: a page is served until the user ends it.
+    if wanted.web:
+        _serve(out, found, model)
 
 
 def _write_explained(out: Output, found: "Diagnosis", model: "Model | Robot", path: Path) -> None:
@@ -347,16 +364,39 @@ def _draw(out: Output, found: "Diagnosis", model: "Model | Robot", wanted: _Want
         save_gap_sheet(evidence, wanted.figure)
         out.line(f"figure: {wanted.figure}")
     if wanted.save is not None:
-        from chladni.apps.gap_structure import structure_sketch
-        from chladni.robots.robot import Robot
         from chladni.viewers.rerun.gap import write_gap_rrd
 
-        # A structure coloured by nothing would look like one that can't explain the gap anywhere.
-        sketch = None
-        if found.where.sites and not isinstance(model, Robot):
-            sketch = structure_sketch(model, found.where)
-        write_gap_rrd(evidence, wanted.save, sketch=sketch)
+        write_gap_rrd(evidence, wanted.save, sketch=_sketch(found, model), scene=_scene(found))
         out.line(f"recording: {wanted.save}")
+
+
+def _serve(out: Output, found: "Diagnosis", model: "Model | Robot") -> None:
+    """Serve the recording to a browser until the user ends it."""
+    from functools import partial
+
+    from chladni.apps.gap_evidence import gap_evidence
+    from chladni.viewers.rerun.gap import draw_gap
+    from chladni.viewers.rerun.web import serve_drawing
+
+    shown = partial(draw_gap, evidence=gap_evidence(found), sketch=_sketch(found, model), scene=_scene(found))
+    with serve_drawing(shown) as server:
+        out.line(server.address)
+        out.line("Open this address in a browser on this computer (nobody else can reach it); Ctrl-C ends.")
+        server.wait()
+
+
+def _sketch(found: "Diagnosis", model: "Model | Robot") -> "StructureSketch | None":
+    from chladni.apps.gap_structure import structure_sketch
+    from chladni.robots.robot import Robot
+
+    # A structure coloured by nothing would look like one that can't explain the gap anywhere.
+    return None if isinstance(model, Robot) or not found.where.sites else structure_sketch(model, found.where)
+
+
+def _scene(found: "Diagnosis") -> "RobotScene | None":
+    from chladni.apps.robot_scene import robot_scene
+
+    return robot_scene(found)
 
 
 def _draw_album(out: Output, evidence: "GapEvidence", *, report: Path | None, figures: Path | None) -> None:

@@ -1,11 +1,12 @@
 """A diagnosis in sentences that read as an answer."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Closing, Diagnosis, FittedNumber
 from chladni.gap.records.log_use import LogUse
 from chladni.viewers.effect_words import cause_phrase, effect_at, effect_heading
 from chladni.viewers.engineering import chance, engineering, percent
+from chladni.viewers.robot_summary import IN_A_SENTENCE, listed, robot_sentences, robot_unknown
 
 # Above the first one says "most likely", above the second "probably", else "perhaps".
 LIKELY, PROBABLE = 0.9, 0.6
@@ -13,8 +14,6 @@ LIKELY, PROBABLE = 0.9, 0.6
 FAINT = 3.0
 # Candidates that are named when none explains the gap.
 NEAREST = 3
-# Causes that one sentence holds.
-_IN_A_SENTENCE = 4
 # Of what closes on the first log, the share below which little carries over to another.
 CARRIED = 0.5
 # Of what any force at a place explains, the share above which a law that follows the motion there does it.
@@ -48,7 +47,7 @@ def caveats(found: Diagnosis) -> tuple[str, ...]:
         *(one for cause in causes for one in _reservations(cause)),
         *(_too_near(found.gap) if causes else ()),
         *_elsewhere(found),
-        *_how(found.gap),
+        *_how(found),
         *filter(None, (found.advice,)),
     }
     return tuple(sentence for sentence in summary(found) if sentence in told)
@@ -80,29 +79,27 @@ def _sentences(found: Diagnosis) -> Iterator[str]:
             yield f"Nothing is missing: {_agreement(found.gap)}."
             yield from _moved(found)
         case "unknown":
-            yield from _unknown(found)
+            yield from _unknown(found) if found.machine is None else robot_unknown(found)
     # Where nothing was named, nothing closes.
     if found.verdict in ("effect", "parameters"):
         yield from _closed(found.gap)
         yield from _elsewhere(found)
-    yield from _how(found.gap)
+    yield from _how(found)
     if found.advice:
         yield found.advice
 
 
 def _effects(found: Diagnosis) -> Iterator[str]:
     causes = found.causes
-    if len(causes) == 1:
+    if found.machine is not None:
+        yield from robot_sentences(found)
+    elif len(causes) == 1:
         (cause,) = causes
         yield f"{_certainty(cause)} {cause_phrase(cause)} ({chance(cause.probability)})."
-    elif len(causes) > _IN_A_SENTENCE:
-        sites = list(dict.fromkeys(cause.site for cause in causes))
-        yield f"{len(causes)} causes at {len(sites)} sites: {_listed(sites)}."
-        yield from _by_site(found)
     else:
         # Two names are as sure as the less sure one.
         least = min(causes, key=lambda cause: cause.probability)
-        told = _listed([f"{cause_phrase(cause)} ({chance(cause.probability)})" for cause in causes])
+        told = listed([f"{cause_phrase(cause)} ({chance(cause.probability)})" for cause in causes])
         yield f"{_certainty(least)} {_COUNT.get(len(causes), 'several')} causes at once: {told}."
     yield _closing(found)
     yield from _shares(found)
@@ -112,27 +109,12 @@ def _effects(found: Diagnosis) -> Iterator[str]:
         yield from _reservations(cause)
 
 
-def _by_site(found: Diagnosis) -> Iterator[str]:
-    """A sentence a site; one of all values that are wrong."""
-    wrong = [cause for cause in found.causes if cause.effect == PARAMETER]
-    causes = [cause for cause in found.causes if cause.effect != PARAMETER]
-    if wrong:
-        yield f"Wrong values: {_listed([_wrong_value(cause, found) for cause in wrong])}."
-    for site in dict.fromkeys(cause.site for cause in causes):
-        told = [
-            f"{cause_phrase(cause).replace(f' at {site}', '')} ({chance(cause.probability)})"
-            for cause in causes
-            if cause.site == site
-        ]
-        yield f"{site}: {_listed(told)}."
-
-
 def _any_law(found: Diagnosis) -> Iterator[str]:
     """What a law of the motion at one place explains, whatever its name."""
     law = found.any_law
     if law is None:
         return
-    site = _listed((law.site, *law.group), word="or")
+    site = listed((law.site, *law.group), word="or")
     if law.named is not None:
         yield (
             f"Any smooth law of what moves at {site} explains {percent(law.law)} of {_LEFT}, "
@@ -176,7 +158,7 @@ def _closing(found: Diagnosis) -> str:
 
 def _shares(found: Diagnosis) -> Iterator[str]:
     """What each of several causes is worth beside the others."""
-    if len(found.causes) > _IN_A_SENTENCE:
+    if len(found.causes) > IN_A_SENTENCE:
         # Tables hold them.
         return
     told = [
@@ -185,7 +167,7 @@ def _shares(found: Diagnosis) -> Iterator[str]:
         if cause.share is not None
     ]
     if len(found.causes) > 1 and told:
-        sentence = f"{_listed(told)} comes back."
+        sentence = f"{listed(told)} comes back."
         yield sentence[0].upper() + sentence[1:]
 
 
@@ -209,16 +191,19 @@ def _carried(here: Closing, there: Closing) -> str:
 def _reservations(cause: Cause) -> Iterator[str]:
     others = [site for site in cause.group if site != cause.site]
     if others:
-        yield f"These sensors can't tell {cause.site} from {_listed(others, word='or')}."
+        yield f"These sensors can't tell {cause.site} from {listed(others, word='or')}."
     if cause.alternatives:
-        told = _listed([effect_at(one.effect, one.site) for one in cause.alternatives], word="or")
+        told = listed([effect_at(one.effect, one.site) for one in cause.alternatives], word="or")
         yield f"This log can't tell {effect_heading(cause.effect)} at {cause.site} from {told}."
 
 
 def _parameters(found: Diagnosis) -> Iterator[str]:
     wrong = [cause for cause in found.causes if cause.effect == PARAMETER]
-    told = _listed([_wrong_value(cause, found) for cause in wrong])
-    yield f"Nothing is missing, but {told}: more than the stated tolerance allows."
+    if found.machine is not None:
+        yield from robot_sentences(found)
+    else:
+        told = listed([_wrong_value(cause, found) for cause in wrong])
+        yield f"Nothing is missing, but {told}: more than the stated tolerance allows."
     gap = found.gap
     yield (
         f"With that the error falls from {percent(gap.before)} to {percent(gap.after)} on stretches that no fit saw, "
@@ -270,7 +255,7 @@ def _unknown(found: Diagnosis) -> Iterator[str]:
     told = []
     if where.sites:
         site = max(where.sites, key=lambda one: one.share)
-        names = _listed((site.name, *site.group), word="or")
+        names = listed((site.name, *site.group), word="or")
         told.append(f"{percent(site.share)} of what they leave can come from {names}")
     if where.bands:
         band = max(where.bands, key=lambda one: one.share)
@@ -298,16 +283,16 @@ def _too_near(gap: Closing) -> Iterator[str]:
         yield "The gap is too near to the noise to say which share of it closes."
 
 
-def _how(gap: Closing) -> Iterator[str]:
+def _how(found: Diagnosis) -> Iterator[str]:
     """How the closing was measured, where it wasn't by free run."""
+    gap = found.gap
     if gap.by == "cross_sensor":
         yield "The cause isn't among the log's inputs: the closing is that of each sensor predicted from the others."
     elif gap.by == "torque":
         yield "Errors are those of the joints' torques: what the drives give against what the motion needs."
     elif gap.by == "windows" and gap.horizon_s is not None:
         span = engineering(gap.horizon_s, None, "s")
+        if found.machine is not None:
+            yield f"Errors are those of simulated positions over the motion, in runs of {span} from the log's poses."
+            return
         yield f"Errors are those of windows of {span}, each from an estimated state; beyond, they drift apart."
-
-
-def _listed(parts: Sequence[str], *, word: str = "and") -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} {word} {parts[-1]}" if parts else ""

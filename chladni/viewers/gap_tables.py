@@ -49,7 +49,11 @@ def noise_told(where: Where) -> str | None:
 
 def where_told(found: Diagnosis) -> Where:
     """Give where the gap lies; of one that nothing explains, bands and regimes of what the best parameters leave."""
-    return found.where if found.left is None else replace(found.left, channels=found.where.channels)
+    if found.left is None:
+        return found.where
+    # Of a robot sites are shares of the torque that is missing, named or not, as its pictures show.
+    sites = found.left.sites if found.machine is None else found.where.sites
+    return replace(found.left, channels=found.where.channels, sites=sites)
 
 
 def band_table(where: Where, *, least: float = 0.0) -> Table:
@@ -153,7 +157,8 @@ def parameter_table(found: Diagnosis) -> Table:
     rows = [
         (name, _nominal(number), engineering(number.value, number.std, number.unit), _change(number))
         for name, number in found.tuned_parameters.items()
-        if number.std is None or _has_moved(number)
+        # Of a robot's many links it's no news that a log doesn't tell the masses.
+        if _has_moved(number) or (number.std is None and found.machine is None)
     ]
     return ("Parameter", "Nominal", "Tuned", "Change"), rows
 

@@ -22,7 +22,12 @@ SIGNED = np.array([(0, 114, 178), (158, 158, 158), (213, 94, 0)], dtype=np.float
 
 def spread_out(surface: RestoringForce) -> Index:
     """Samples to draw, evenly over time."""
-    return np.unique(np.linspace(0, surface.force.size - 1, min(POINTS, surface.force.size)).astype(np.intp))
+    return spread_over(surface.force.size)
+
+
+def spread_over(samples: int) -> Index:
+    """As many of some samples as can be told apart as dots, evenly over time."""
+    return np.unique(np.linspace(0, samples - 1, min(POINTS, samples)).astype(np.intp))
 
 
 def motion(surface: RestoringForce, over: Over) -> Real:

@@ -4,8 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from chladni.gap.calibration import COVERAGE
 from chladni.gap.records.log_use import LogUse
+from chladni.gap.records.robot import JointMotion, TorqueMap
 from chladni.robots.machine import Machine
 from chladni.signals.arrays import Real
 from chladni.signals.value import Value, require_shape
@@ -290,7 +293,10 @@ class GapSignals(Value):
     gap_map_after
         The same after.
     window_starts
-        Samples at which windows begin, each from an estimated state: simulations jump there. Empty in free run.
+        Samples at which windows begin, each from an estimated state: simulations jump there. Empty in free run. Of a
+        robot, stretches without a gap.
+    time_s
+        ``[sample]`` from the log's start; None where the first sample is second 0 and none is left out.
     """
 
     log: str
@@ -307,9 +313,21 @@ class GapSignals(Value):
     gap_map: Real
     gap_map_after: Real
     window_starts: tuple[int, ...] = ()
+    time_s: Real | None = None
 
     def __post_init__(self) -> None:
         self._freeze()
+
+    @property
+    def seconds(self) -> Real:
+        """``[sample]`` from the log's start."""
+        return np.arange(self.measured.shape[1]) / self.sample_rate_hz if self.time_s is None else self.time_s
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """Time of the first sample, and the end of the last."""
+        seconds = self.seconds
+        return float(seconds[0]), float(seconds[-1]) + 1.0 / self.sample_rate_hz
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -398,6 +416,8 @@ class Diagnosis:
         Where something is left: what a law of the motion at one place would explain, whatever its name.
     machine
         Of a robot: its description with what was found, to be simulated or written; None of a model.
+    motion, torque_maps
+        Of a robot: its joints' positions, measured and simulated; their torques over speed and position.
     answer_set, coverage
         Effects and sites that together hold the truth with this probability; empty where nothing was weighed.
     """
@@ -424,6 +444,8 @@ class Diagnosis:
     correlation: Correlation | None = None
     any_law: AnyLaw | None = None
     machine: Machine | None = None
+    motion: JointMotion | None = None
+    torque_maps: tuple[TorqueMap, ...] = ()
     answer_set: tuple[Candidate, ...] = ()
     coverage: float = COVERAGE
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from chladni.gap.calibration import CLOSE, COVERAGE, LAPSE, LEAST_SHARE, NAMED, TEMPER
-from chladni.gap.comparison.shares import band_shares, gap_map, regime_shares, relative_residual
+from chladni.gap.comparison.shares import band_shares, regime_shares, relative_residual
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.records.diagnosis import (
     PARAMETER,
@@ -19,7 +19,6 @@ from chladni.gap.records.diagnosis import (
     Closing,
     Diagnosis,
     FittedNumber,
-    GapSignals,
     HeldOut,
     Ranked,
     SiteShare,
@@ -29,6 +28,7 @@ from chladni.gap.records.diagnosis import (
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forward import Confirmed, confirmed, machine_of
 from chladni.gap.robots.next_measurement import next_measurement
+from chladni.gap.robots.pictures import joint_motion, torque_maps, torque_signals
 from chladni.gap.robots.pushes import Push
 from chladni.gap.robots.remarks import pushes_told, remarks_on
 from chladni.gap.robots.search import alternatives
@@ -88,8 +88,8 @@ class Answer:
         return self._confirmed[1]
 
     @cached_property
-    def _confirmed(self) -> tuple[tuple["Weighed", ...], Confirmed | None]:
-        """The names with which positions are simulated no worse than without, and that simulation.
+    def _confirmed(self) -> tuple[tuple["Weighed", ...], Confirmed | None, Confirmed | None]:
+        """The names with which positions are simulated no worse than without, that simulation, and any run.
 
         What acts where the error grew most goes first, the least probable before others.
         """
@@ -98,12 +98,12 @@ class Answer:
             best = self._contest.fit([one.term for one in named])
             found = confirmed(Solved(contest=self._contest, best=best))
             if found is None or not np.all(np.isfinite([found.before, found.tuned, found.after])):
-                return named, None
+                return named, None, found
             first = first or found
             if not named:
-                return (), first
+                return (), first, first
             if not found.denies:
-                return named, found
+                return named, found, found
             named = _without_worst(named, found, self.solved.torques)
 
     @cached_property
@@ -154,6 +154,7 @@ class Answer:
         """Give the record."""
         solved = self.solved
         joints = [solved.torques.name_of(row) for row in self.unexplained]
+        told = self._contest.fit([one.term for one in self.named])
         return Diagnosis(
             model=solved.torques.robot.name,
             logs=(solved.torques.log.log,),
@@ -167,8 +168,10 @@ class Answer:
             next_measurement=self._next_measurement(joints),
             remarks=remarks_on(solved, joints if self.named else ()),
             advice=_advice(self.verdict, joints, self.denied, self.solved.pushes),
-            signals=_signals(solved),
-            machine=machine_of(self._contest, self._contest.fit([one.term for one in self.named])),
+            signals=torque_signals(solved.torques, self._contest.explained(told)),
+            machine=machine_of(self._contest, told),
+            motion=joint_motion(solved.torques, self._confirmed[2], named=bool(self.named)),
+            torque_maps=torque_maps(self._contest, self._best, [one.term for one in self.named]),
             answer_set=tuple(dict.fromkeys(each for one in self.weighed for each in (one.candidate, *one.others))),
             coverage=COVERAGE,
         )
@@ -352,7 +355,7 @@ def _ranking(weighed: Sequence[Weighed]) -> Iterator[Ranked]:
 def _where(solved: Solved, fit: Fit) -> Where:
     torques = solved.torques
     rows = [row for row, _ in torques.rows]
-    residual, drive = _whole(torques, torques.missing - solved.contest.explained(fit))[rows], torques.asked[rows]
+    residual, drive = torques.whole(torques.missing - solved.contest.explained(fit))[rows], torques.asked[rows]
     power, usual = np.mean(relative_residual(residual, drive) ** 2, axis=1), _usual(torques)[rows]
     shares = power / power.sum() if power.sum() > 0 else power
     rate = torques.rate_hz
@@ -373,12 +376,6 @@ def _where(solved: Solved, fit: Fit) -> Where:
         regimes=tuple(replace(one, unit=units[one.variable]) for one in regime_shares(residual, drive, regimes)),
         times=time_shares(residual, drive, sample_rate_hz=rate),
     )  # fmt: skip
-
-
-def _whole(torques: Torques, missing: Real) -> Real:
-    """Give ``[joint, coarse]``: what the loops asked for beyond what was needed, where rows tell the two parts."""
-    count = len(torques.joints)
-    return missing[:count] + missing[count:] if torques.two_sided else missing
 
 
 def _of_torques(solved: Solved, named: Sequence[Term]) -> Closing:
@@ -443,32 +440,6 @@ def _held_out(torques: Torques, at_s: Real, rate_hz: float) -> tuple[HeldOut, ..
 
 def _every_other(count: int) -> Mask:
     return np.asarray(np.arange(count) * _BLOCKS // count % 2 == 1)
-
-
-def _signals(solved: Solved) -> GapSignals:
-    """Torques of the drives beside what the motion needs: as described, and with what was found."""
-    torques, contest = solved.torques, solved.contest
-    drive, missing = torques.asked, _whole(torques, torques.missing)
-    after = drive - _whole(torques, torques.missing - contest.explained(solved.best))
-    noise = np.sqrt(_whole(torques, torques.noise**2))
-    rate = torques.rate_hz
-    lines = drive.shape[1] // 2 + 1
-    time_s, frequency_hz, density = gap_map(missing, drive, rate)
-    return GapSignals(
-        log=torques.log.log,
-        sample_rate_hz=rate,
-        output_names=tuple(one.name for one in torques.joints),
-        output_units=tuple("N m" if one.kind == "hinge" else "N" for one in torques.joints),
-        measured=drive,
-        before=torques.wanted,
-        after=after,
-        noise_rms=noise,
-        noise_density=np.repeat((noise**2 / (rate / 2.0))[:, None], lines, axis=1),
-        map_time_s=time_s,
-        map_frequency_hz=frequency_hz,
-        gap_map=density,
-        gap_map_after=gap_map(drive - after, drive, rate)[2],
-    )
 
 
 def _advice(verdict: Verdict, joints: Sequence[str], denied: Confirmed | None, pushes: Sequence[Push]) -> str | None:

@@ -50,7 +50,7 @@ class Confirmed:
         ``[joint]``: RMS of the measured position about its mean, rad (m).
     time_s
         ``[sample]`` from the log's start.
-    measured, simulated_before, simulated_after
+    measured, simulated_before, simulated_tuned, simulated_after
         ``[joint, sample]`` positions; NaN where nothing was run.
     judged
         ``[sample]``: the stretches that judge.
@@ -71,6 +71,7 @@ class Confirmed:
     time_s: Real
     measured: Real
     simulated_before: Real
+    simulated_tuned: Real
     simulated_after: Real
     judged: Mask
     horizon_s: float
@@ -386,6 +387,7 @@ def _told(
     return Confirmed(
         before=whole[0], tuned=whole[1], after=whole[2], joints=torques.log.joints,
         per_joint_before=per_joint[0], per_joint_tuned=per_joint[1], per_joint_after=per_joint[2], motion=motion,
-        time_s=torques.log.time_s, measured=measured, simulated_before=courses[0], simulated_after=courses[2],
-        judged=there, horizon_s=max(b - a for a, b in runs) / torques.log.sample_rate_hz, held_out=held_out,
+        time_s=torques.log.time_s, measured=measured, simulated_before=courses[0], simulated_tuned=courses[1],
+        simulated_after=courses[2], judged=there, held_out=held_out,
+        horizon_s=max(b - a for a, b in runs) / torques.log.sample_rate_hz,
     )  # fmt: skip

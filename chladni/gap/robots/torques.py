@@ -528,6 +528,11 @@ class Torques:
     def _steps(self) -> tuple[Real, Real]:
         return steps_and_noise(self.log.position, self.log.sample_rate_hz, self.stretches)
 
+    def whole(self, missing: Real) -> Real:
+        """Give ``[joint, ...]`` of rows: what the loops asked for beyond what was needed, where these tell both parts."""
+        count = len(self.joints)
+        return np.asarray(missing[:count] + missing[count:] if self.two_sided else missing)
+
     @cached_property
     def rest(self) -> Real:
         """``[row, coarse]``: what is missing beyond what was explained already."""

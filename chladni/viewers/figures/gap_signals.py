@@ -85,15 +85,18 @@ def stacked(
 def windows_told(found: Diagnosis) -> str:
     """Say over what windows simulations run, in a few words for a title; nothing where they run free."""
     gap = found.gap
-    return (
-        "" if gap.by != "windows" or gap.horizon_s is None else f"windows of {engineering(gap.horizon_s, None, 's')}"
-    )
+    # Of a robot the signals are torques; windows are those of its positions.
+    if found.motion is not None or gap.by != "windows" or gap.horizon_s is None:
+        return ""
+    return f"windows of {engineering(gap.horizon_s, None, 's')}"
 
 
 def draw_zoom(axes: Axes, signals: GapSignals, row: int, span_s: tuple[float, float], *, after: str | None) -> None:
     """Draw one output as measured and as simulated, before and after (alone if None), between two times."""
-    first, last = (round(end * signals.sample_rate_hz) for end in span_s)
-    time_s = np.arange(first, last) / signals.sample_rate_hz
+    # Half a sample early: a span begins and ends at samples, as far as numbers can be exact.
+    half_s = 0.5 / signals.sample_rate_hz
+    first, last = (int(np.searchsorted(signals.seconds, end - half_s)) for end in span_s)
+    time_s = signals.seconds[first:last]
     starts = np.array([start - first for start in signals.window_starts if first < start < last], dtype=np.intp)
     axes.plot(time_s, signals.measured[row, first:last], color=MEASURED, linewidth=2.6, label="measured")
     # Each wider than what is drawn over it, so that none is hidden by one that follows it.
@@ -111,7 +114,7 @@ def draw_zoom(axes: Axes, signals: GapSignals, row: int, span_s: tuple[float, fl
 def _draw_errors(axes: Axes, signals: GapSignals, row: int, *, after: str | None) -> None:
     """Errors of the whole log; the noise as a band."""
     starts = np.array(signals.window_starts[1:], dtype=np.intp)
-    time_s = np.arange(signals.measured.shape[1]) / signals.sample_rate_hz
+    time_s = signals.seconds
     lines = [(signals.before, BEFORE, 0.9, "error" if after is None else "error before")]
     if after is not None:
         lines.append((signals.after, AFTER, 0.5, f"error {after}"))
@@ -121,5 +124,5 @@ def _draw_errors(axes: Axes, signals: GapSignals, row: int, *, after: str | None
         axes.plot(x[chosen], y[chosen], color=colour, linewidth=width, label=label)
     noise = float(signals.noise_rms[row])
     axes.axhspan(-noise, noise, color="black", alpha=0.25, linewidth=0, zorder=4, label="noise")
-    axes.set_xlim(0, signals.measured.shape[1] / signals.sample_rate_hz)
+    axes.set_xlim(*signals.span_s)
     axes.set_ylabel(f"[{plain(printed_unit(signals.output_units[row]))}]")

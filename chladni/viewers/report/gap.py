@@ -58,9 +58,12 @@ def gap_report_html(evidence: GapEvidence, *, album: Album | None = None) -> str
 def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
     yield element("h1", escaped(title))
     yield _logs(found)
+    # Of a robot one picture shows the difference at once.
+    yield _section("Torque that is missing", _flow(_pictures(found, album, "residuals")))
     yield _section("Answer", _answer(found))
     yield _section("Causes", _causes(found))
-    yield _section("Evidence", _flow(_pictures(found, album, "signals", "errors", "spectra", "force")))
+    yield _section("Friction", _flow(_pictures(found, album, "friction", "positions")))
+    yield _section("Evidence", _flow(_pictures(found, album, "motion", "signals", "errors", "spectra", "force")))
     # With one sensor no site can be told from another, and bands and regimes are read as easily in tables.
     drawn = bool(found.where.sites and album.sections.get("shares"))
     places = ("shares", "map") if drawn else ("map",)
@@ -170,6 +173,15 @@ def _captions(found: Diagnosis) -> Mapping[str, str]:
     drawn = any(one.law_force is not None for one in found.restoring_forces)
     coloured = any(one.name in sites for one in found.where.sites)
     return {
+        "residuals": (
+            f"What the drives give less what the motion needs, before and {after}; with each joint's share of it."
+        ),
+        "friction": (
+            "Friction of the joints over their speed: everything else that was found is taken out. Dashed: as "
+            "described. Blue: as found. Each dot is a sample, coloured by the load of its joint."
+        ),
+        "positions": "What is missing beside friction, over the position: ripple, springs and stops show here.",
+        "motion": f"Simulated positions less measured ones, before and {after}, in runs from the log's poses.",
         "signals": (
             f"Where the model errs most: measured, simulated before, and {after}.{each}"
             if found.machine is None

@@ -24,7 +24,7 @@ def draw_signals(
     recording: rr.RecordingStream, signals: GapSignals, telling_s: tuple[float, float] | None, *, after: str
 ) -> list[rrb.View]:
     """Write every output as measured, before and after; each view opens where the model errs most."""
-    start_s, end_s = telling_s or (0.0, signals.measured.shape[1] / signals.sample_rate_hz)
+    start_s, end_s = telling_s or signals.span_s
     lines = (
         ("measured", signals.measured, MEASURED_ON_DARK, 3.0),
         ("simulated before", signals.before, BEFORE_ON_DARK, 1.2),
@@ -41,18 +41,20 @@ def draw_signals(
     return views
 
 
-def draw_errors(recording: rr.RecordingStream, signals: GapSignals, *, after: str) -> list[rrb.View]:
-    """Write what is left of every output, before and after; each view opens on the whole log."""
-    end_ns = round(signals.measured.shape[1] / signals.sample_rate_hz * NS_PER_S)
+def draw_errors(
+    recording: rr.RecordingStream, signals: GapSignals, *, after: str, what: str = "Error of"
+) -> list[rrb.View]:
+    """Write what is left of every output, before and after; each view, named by `what`, opens on the whole log."""
+    start_ns, end_ns = (round(end * NS_PER_S) for end in signals.span_s)
     lines = (("error before", signals.before, BEFORE_ON_DARK), (f"error {after}", signals.after, AFTER_ON_DARK))
     views = []
     for row, name in enumerate(signals.output_names):
         parent, stretch = _parent("errors", row), 1
-        for place, (what, simulated, colour) in enumerate(lines):
+        for place, (label, simulated, colour) in enumerate(lines):
             error = signals.measured[row] - simulated[row]
-            stretch = _line(recording, signals, f"{parent}/{place}", error, what, colour, 1.0)
+            stretch = _line(recording, signals, f"{parent}/{place}", error, label, colour, 1.0)
         unit, noise = printed_unit(signals.output_units[row]), float(signals.noise_rms[row])
-        views.append(_view(parent, f"Error of {name} [{unit}], noise {noise:.3g}{thinned(stretch)}", 0, end_ns))
+        views.append(_view(parent, f"{what} {name} [{unit}], noise {noise:.3g}{thinned(stretch)}", start_ns, end_ns))
     return views
 
 
@@ -76,7 +78,7 @@ def _line(
     recording.log(path, look, static=True)
     limit = min(ROWS_OF_A_LINE, ROWS_OF_A_FILE // (LINES_OF_AN_OUTPUT * len(signals.output_names)))
     chosen, stretch = thin(values, limit=limit)
-    offsets_ns = np.rint(chosen / signals.sample_rate_hz * NS_PER_S).astype(np.int64)
+    offsets_ns = np.rint(signals.seconds[chosen] * NS_PER_S).astype(np.int64)
     send_scalars(recording, path, time_index(offsets_ns), values[chosen])
     return stretch
 

@@ -6,14 +6,18 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO
 
+import rerun as rr
+
 from chladni.signals.errors import SetupError
-from chladni.signals.study import Study
-from chladni.viewers.rerun.drawing import draw, new_recording
+from chladni.viewers.rerun.drawing import new_recording
+
+Drawing = Callable[[rr.RecordingStream], None]
+"""Writes all of something and its blueprint into a recording that is connected already."""
 
 LOOPBACK = "127.0.0.1"
 PATIENCE_S = 30.0
@@ -85,11 +89,11 @@ def stop(process: "subprocess.Popen[bytes]") -> None:
         process.stdin.close()
 
 
-def send(study: Study, port: int) -> None:
-    """Draw a study into the program that listens on `port`, and wait until it has everything."""
+def send(drawing: Drawing, port: int) -> None:
+    """Draw into the program that listens on `port`, and wait until it has everything."""
     recording = new_recording()
     recording.connect_grpc(f"rerun+http://{LOOPBACK}:{port}/proxy")
-    draw(recording, study)
+    drawing(recording)
     # Data still on its way would be lost when Python ends.
     recording.flush()
     recording.disconnect()

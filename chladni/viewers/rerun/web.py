@@ -1,12 +1,14 @@
 """A study served to a browser on this computer."""
 
+from functools import partial
 from subprocess import Popen
 from types import TracebackType
 from typing import Self
 from urllib.parse import quote
 
 from chladni.signals.study import Study
-from chladni.viewers.rerun.process import LOOPBACK, free_port, send, start, stop
+from chladni.viewers.rerun.drawing import draw
+from chladni.viewers.rerun.process import LOOPBACK, Drawing, free_port, send, start, stop
 
 
 class WebViewer:
@@ -40,12 +42,23 @@ class WebViewer:
 
 
 def serve_web(study: Study, *, port: int = 0) -> WebViewer:
-    """Serve a study to a browser on this computer, bound to loopback only.
+    """Serve a study to a browser on this computer; what it gives and raises is as of `serve_drawing`.
 
     Parameters
     ----------
     study
         What to draw.
+    """
+    return serve_drawing(partial(draw, study=study), port=port)
+
+
+def serve_drawing(drawing: Drawing, *, port: int = 0) -> WebViewer:
+    """Serve what is drawn into a recording to a browser on this computer, bound to loopback only.
+
+    Parameters
+    ----------
+    drawing
+        Writes all of it.
     port
         Port of the page; 0 takes a free one.
 
@@ -66,7 +79,7 @@ def serve_web(study: Study, *, port: int = 0) -> WebViewer:
     process = start(options, ports=[data_port, page_port], detached=False)
     data = quote(f"rerun+http://{LOOPBACK}:{data_port}/proxy", safe="")
     try:
-        send(study, data_port)
+        send(drawing, data_port)
     except BaseException:
         stop(process)
         raise

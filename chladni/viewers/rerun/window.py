@@ -1,8 +1,10 @@
 """A study shown in the viewer's own window."""
 
+from functools import partial
 from subprocess import Popen
 
 from chladni.signals.study import Study
+from chladni.viewers.rerun.drawing import draw
 from chladni.viewers.rerun.process import free_port, send, start
 
 SETTLE_S = 1.0
@@ -20,4 +22,4 @@ def spawn(study: Study) -> None:
     """
     port = free_port()
     _open_windows.append(start(["--port", str(port)], ports=[port], detached=True, settle_s=SETTLE_S))
-    send(study, port)
+    send(partial(draw, study=study), port)
