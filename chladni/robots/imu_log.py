@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from chladni.io.message_path import near_matches, topic_text
+from chladni.robots.floating_base import floating_base
 from chladni.signals.errors import LogError
 from chladni.signals.resampling import join_resampled
 from chladni.signals.time_series import NS_PER_S, TimeSeries
@@ -16,7 +17,7 @@ from chladni.signals.visible import visible
 if TYPE_CHECKING:
     from chladni.io.log import Log
     from chladni.robots.robot import Robot
-    from chladni.signals.arrays import Index, Real
+    from chladni.signals.arrays import Index, Mask, Real
 
 _GYRO: Final = "angular_velocity"
 _ACCELEROMETER: Final = "linear_acceleration"
@@ -45,8 +46,21 @@ class ImuLog:
     linear_acceleration: Real
     orientation: Real | None
 
+    def at(self, kept: Index) -> ImuLog:
+        """Give some samples of it."""
+        attitude = None if self.orientation is None else self.orientation[:, kept]
+        return replace(
+            self, angular_velocity=self.angular_velocity[:, kept],
+            linear_acceleration=self.linear_acceleration[:, kept], orientation=attitude,
+        )  # fmt: skip
 
-def read_imu(robot: Robot, log: Log, states: TimeSeries, kept: Index) -> tuple[ImuLog | None, tuple[str, ...]]:
+    @property
+    def there(self) -> Mask:
+        """``[sample]``: where it has any."""
+        return np.asarray(np.isfinite([*self.angular_velocity, *self.linear_acceleration]).all(axis=0))
+
+
+def read_imu(robot: Robot, log: Log, states: TimeSeries) -> tuple[ImuLog | None, tuple[str, ...]]:
     """Read the IMU that the robot file names; of a base that floats the only one of the log, without a robot file.
 
     Parameters
@@ -55,8 +69,6 @@ def read_imu(robot: Robot, log: Log, states: TimeSeries, kept: Index) -> tuple[I
         As for `chladni.robots.joint_log.joint_log`.
     states
         Whose grid it's brought to.
-    kept
-        Samples of it.
 
     Returns
     -------
@@ -86,7 +98,7 @@ def read_imu(robot: Robot, log: Log, states: TimeSeries, kept: Index) -> tuple[I
         samples=states.samples,
         method="band-limited",
     ).series.select(wanted)
-    values = read.values[:, kept].astype(np.float64)
+    values = read.values.astype(np.float64)
     return (
         ImuLog(
             topic=topic,
@@ -114,7 +126,9 @@ def _chosen(robot: Robot, log: Log, topics: set[str]) -> tuple[str | None, str, 
         told = ", ".join(map(visible, sorted(topics)))
         return None, "", (f"{told}: name the IMU of the base as imu in [log] of a robot file",)
     topic = next(iter(topics))
-    site = next((one for one in robot.sites if "imu" in one.lower()), robot.links[0])
+    base = floating_base(robot)
+    usual = robot.links[0] if base is None else base.link
+    site = next((one for one in (*robot.sites, *robot.links) if "imu" in one.lower()), usual)
     return topic, site, (f"{visible(topic)} is taken as the IMU of the base, at {visible(site)}",)
 
 

@@ -10,6 +10,7 @@ from chladni.gap.robots.solved import Solved
 from chladni.gap.robots.torques import ALL_COMMANDS, Torques
 from chladni.gap.robots.words import INERTIAL_NAMES, LOOP_S, Term, tolerated_inertia
 from chladni.robots.dynamics import inertial_numbers
+from chladni.robots.floating_base import BaseMotion
 from chladni.robots.machine import Coupling, Machine, MachineJoint, as_described, physical
 from chladni.signals.arrays import Mask, Real
 
@@ -286,11 +287,26 @@ def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -
     driven = Driven(
         asked=_asked(machine, torques, np.concatenate(at_s)), kind=_kinds(torques), every=every, step_s=step_s,
         position=torques.fast_position[:, starts], velocity=torques.fast_velocity[:, starts],
-        steps=np.array([one.size for one in at_s]),
+        steps=np.array([one.size for one in at_s]), base=_base(torques, np.concatenate(at_s)),
     )  # fmt: skip
     found = np.full_like(log.position, np.nan)
     found[:, np.concatenate(samples)] = run(machine, names, driven)
     return found
+
+
+def _base(torques: Torques, at_s: Real) -> BaseMotion | None:
+    """How a base that floats moves, as fast as joints are followed."""
+    moved = torques.fast_base
+    if moved is None:
+        return None
+
+    def at(rows: Real) -> Real:
+        return np.array([np.interp(at_s, torques.log.time_s, row) for row in rows])
+
+    return BaseMotion(
+        force=at(moved.force), angular_velocity=at(moved.angular_velocity),
+        angular_acceleration=at(moved.angular_acceleration),
+    )  # fmt: skip
 
 
 def _kinds(torques: Torques) -> tuple[str, ...]:

@@ -13,10 +13,12 @@ from scipy.signal import butter, sosfiltfilt
 
 from chladni.gap.robots.joint_noise import steps_and_noise, torque_noise
 from chladni.robots.dynamics import Needed, gravity_columns, needed_torque
+from chladni.robots.floating_base import BaseMotion, FloatingBase, at_origin, floating_base, place_on_base
 from chladni.robots.joint_log import JointLog
 from chladni.robots.robot import Robot, RobotJoint
 from chladni.signals.arrays import Index, Mask, Real
 from chladni.signals.errors import LogError, ModelError
+from chladni.signals.visible import visible
 
 #: Up to which frequency torques are compared, Hz: joints of arms and legs move below it, and differentiated encoder
 #: steps grow with its square (Swevers, Verdonck & De Schutter 2007 take 10 Hz).
@@ -151,10 +153,15 @@ class Torques:
             found[..., a:b] = correlate1d(values[..., a:b], _SLOPE, axis=-1, mode="nearest") * self.log.sample_rate_hz
         return found
 
+    @property
+    def _fast_hz(self) -> float:
+        """A few cutoffs."""
+        return min(_FAST * self.cutoff_hz, 0.4 * self.log.sample_rate_hz)
+
     @cached_property
     def fast_position(self) -> Real:
         """``[joint, sample]`` of the log's grid, below a few cutoffs."""
-        return self._filtered(self.log.position, min(_FAST * self.cutoff_hz, 0.4 * self.log.sample_rate_hz))
+        return self._filtered(self.log.position, self._fast_hz)
 
     @cached_property
     def fast_velocity(self) -> Real:
@@ -184,25 +191,52 @@ class Torques:
         return self._motion[2]
 
     @cached_property
-    def all_positions(self) -> Real:
-        """``[dof, coarse]`` of the whole robot: joints that the log lacks rest where the description has them."""
-        return self._of_dofs(self.position, np.asarray(self.robot.model.qpos0, dtype=np.float64))
+    def base(self) -> FloatingBase | None:
+        """The base, where it floats."""
+        return floating_base(self.robot)
 
-    def _of_dofs(self, rows: Real, rest: Real) -> Real:
-        found = np.repeat(rest[:, None], rows.shape[1], axis=1)
-        found[[one.dof for one in self.joints]] = rows
-        return found
+    @cached_property
+    def fast_base(self) -> BaseMotion | None:
+        """``[axis, sample]`` of the log's grid: motion of a base that floats, below a few cutoffs."""
+        return self._base_motion(self._fast_hz)
+
+    def _base_motion(self, cutoff_hz: float) -> BaseMotion | None:
+        """Give the motion of a base that floats, as its IMU tells it below a cutoff."""
+        if self.base is None or self.log.imu is None:
+            return None
+        imu = self.log.imu
+        axes, place = place_on_base(self.robot, self.base, imu.site)
+        force, turning = (self._filtered(axes @ one, cutoff_hz) for one in (imu.linear_acceleration, imu.angular_velocity))
+        felt = BaseMotion(force=force, angular_velocity=turning, angular_acceleration=self._rate(turning))
+        return at_origin(place, felt)
+
+    @cached_property
+    def all_positions(self) -> Real:
+        """``[qpos, coarse]`` of the whole robot: joints that the log lacks rest where the description has them."""
+        rest = np.asarray(self.robot.model.qpos0, dtype=np.float64).copy()
+        if self.base is not None:
+            # Everything is told in the axes of the base.
+            rest[self.base.position : self.base.position + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+        return _laid(self.position, [one.position for one in self.joints], rest)
+
+    @cached_property
+    def _rates(self) -> tuple[Real, Real]:
+        """``[dof, coarse]``: velocities and accelerations."""
+        still, places = np.zeros(self.robot.model.nv), [one.dof for one in self.joints]
+        velocity, acceleration = (_laid(one, places, still) for one in (self.velocity, self.acceleration))
+        motion = self._base_motion(self.cutoff_hz)
+        if self.base is not None and motion is not None:
+            linear, angular = (slice(a, a + 3) for a in (self.base.dof, self.base.dof + 3))
+            velocity[angular] = motion.angular_velocity[:, self.kept]
+            gravity = np.array(self.robot.model.opt.gravity)
+            acceleration[linear] = motion.force[:, self.kept] + gravity[:, None]
+            acceleration[angular] = motion.angular_acceleration[:, self.kept]
+        return velocity, acceleration
 
     @cached_property
     def need(self) -> Needed:
         """What the motion needs, of every degree of freedom."""
-        still = np.zeros(self.robot.model.nv)
-        return needed_torque(
-            self.robot,
-            self.all_positions,
-            self._of_dofs(self.velocity, still),
-            self._of_dofs(self.acceleration, still),
-        )
+        return needed_torque(self.robot, self.all_positions, *self._rates)
 
     def of_joints(self, dofs: Real) -> Real:
         """Rows of the log's joints among ``[..., dof, coarse]``."""
@@ -219,10 +253,8 @@ class Torques:
         step, columns = 1e-4, []
         for one in self.joints:
             moved = self.all_positions.copy()
-            moved[one.dof] += step
-            still = np.zeros(self.robot.model.nv)
-            v, a = self._of_dofs(self.velocity, still), self._of_dofs(self.acceleration, still)
-            columns.append(-(needed_torque(self.robot, moved, v, a).torque - self.need.torque) / step)
+            moved[one.position] += step
+            columns.append(-(needed_torque(self.robot, moved, *self._rates).torque - self.need.torque) / step)
         return self.of_joints(np.array(columns))
 
     def command(self, later_s: float = 0.0) -> Real:
@@ -344,8 +376,7 @@ class Torques:
     @cached_property
     def noise_of_speed(self) -> Real:
         """``[joint]``: standard deviation of the fast velocity's noise."""
-        fast = min(_FAST * self.cutoff_hz, 0.4 * self.log.sample_rate_hz)
-        noise = np.sqrt(self._steps[1] * (2.0 * np.pi) ** 2 * fast**3 / 3.0)
+        noise = np.sqrt(self._steps[1] * (2.0 * np.pi) ** 2 * self._fast_hz**3 / 3.0)
         usual = np.std(self.fast_velocity, axis=1)
         return np.asarray(np.maximum(noise, _STILL * usual) + 1e-12)
 
@@ -405,6 +436,13 @@ class Torques:
         return self.kp[:, None] * self.smooth(earlier) / (last - first)
 
 
+def _laid(rows: Real, places: list[int], rest: Real) -> Real:
+    """Give rows at their places among those that rest."""
+    found = np.repeat(rest[:, None], rows.shape[1], axis=1)
+    found[places] = rows
+    return found
+
+
 def _integral(at: Real, starts: Real, values: Real, sums: Real) -> Real:
     """Of a held signal from the first start to some times; before it the first value holds."""
     place = np.maximum(np.searchsorted(starts, at, "right") - 1, 0)
@@ -415,10 +453,11 @@ def torques_of(robot: Robot, log: JointLog) -> Torques:
     """Give the torques of a log."""
     cutoff = min(CUTOFF_HZ, _MOST * log.sample_rate_hz)
     found = Torques(robot=robot, log=log, cutoff_hz=cutoff)
-    if robot.base == "floating":
-        raise ModelError(
-            f"{robot.name}: its base floats, and inverse dynamics needs its pose; fix it in the description (leave "
-            "out its free joint) and hang the robot up to diagnose its joints"
+    if found.base is not None and log.imu is None:
+        raise LogError(
+            f"{log.log}: {robot.name}'s base floats, and no IMU tells how it moves; record one (sensor_msgs/Imu) on "
+            f"{visible(found.base.link)} and name it as imu in [log] of a robot file, or hold the base still and say "
+            'base = "fixed" there'
         )
     if log.command is None and not found.by_effort:
         raise LogError(f"{log.log}: neither commands nor measured efforts; record one of them beside the states")

@@ -266,8 +266,10 @@ def _readings(torques: Torques) -> Iterator[Term]:
 
 
 def _bodies(torques: Torques) -> Iterator[Term]:
-    angles = tuple(Number(name=name, unit="rad", scale=_TILT) for name in ("about_x", "about_y"))
-    yield Term(word="gravity_tilt", site=WORLD, columns=torques.tilt, numbers=angles)
+    if torques.base is None:
+        # Of a base that floats an IMU tells which way is down.
+        angles = tuple(Number(name=name, unit="rad", scale=_TILT) for name in ("about_x", "about_y"))
+        yield Term(word="gravity_tilt", site=WORLD, columns=torques.tilt, numbers=angles)
     numbers = inertial_numbers(torques.robot)
     columns = torques.of_joints(np.moveaxis(torques.need.regressor, (2, 3), (0, 1)))
     usual = _PAYLOAD * float(np.max(numbers[:, 0]))
