@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.robots.floating_base import FloatingBase
 from chladni.robots.robot import Robot
 from chladni.signals.arrays import Real
 from chladni.signals.value import Value
@@ -48,6 +49,19 @@ def needed_torque(robot: Robot, position: Real, velocity: Real, acceleration: Re
 
     torque, links = walk(robot.model, position, velocity, acceleration)
     return Needed(torque=torque, regressor=_regressor(links), inertia=inertia_diagonal(robot.model, position))
+
+
+def carried_columns(robot: Robot, base: FloatingBase, position: Real) -> Real:
+    """Give ``[6, dof, sample]``: torque a unit of the base's acceleration, linear, then angular, in its own axes.
+
+    Parameters
+    ----------
+    position
+        ``[qpos, sample]`` with the base's axes those of the world.
+    """
+    from chladni.robots.mujoco_motion import inertia_columns
+
+    return inertia_columns(robot.model, position, slice(base.dof, base.dof + 6))
 
 
 def gravity_columns(robot: Robot, position: Real) -> Real:

@@ -38,6 +38,8 @@ class ImuLog:
         ``[axis, sample]`` rad/s and m/s^2, in the frame of the IMU; a level IMU at rest shows +9.81 along z.
     orientation
         ``[w x y z, sample]``, of the IMU in the world; None where nobody fills it.
+    sample_rate_hz
+        Its own.
     """
 
     topic: str
@@ -45,6 +47,7 @@ class ImuLog:
     angular_velocity: Real
     linear_acceleration: Real
     orientation: Real | None
+    sample_rate_hz: float
 
     def at(self, kept: Index) -> ImuLog:
         """Give some samples of it."""
@@ -91,8 +94,9 @@ def read_imu(robot: Robot, log: Log, states: TimeSeries) -> tuple[ImuLog | None,
     attitude = [path for axis in "wxyz" if (path := f"{topic}.{_ATTITUDE}.{axis}") in known]
     wanted = [*turning, *pushing, *(attitude if len(attitude) == 4 else ())]
     begin_s = (states.start_time_ns - log.start_time_ns) / NS_PER_S
+    groups = log.read_groups(wanted, start_s=begin_s - _BEYOND_S, end_s=begin_s + states.duration_s + _BEYOND_S)
     read = join_resampled(
-        log.read_groups(wanted, start_s=begin_s - _BEYOND_S, end_s=begin_s + states.duration_s + _BEYOND_S),
+        groups,
         sample_rate_hz=states.sample_rate_hz,
         start_time_ns=states.start_time_ns,
         samples=states.samples,
@@ -106,6 +110,7 @@ def read_imu(robot: Robot, log: Log, states: TimeSeries) -> tuple[ImuLog | None,
             angular_velocity=values[:3],
             linear_acceleration=values[3:6],
             orientation=_filled_attitude(values[6:]),
+            sample_rate_hz=min(one.sample_rate_hz for one in groups),
         ),
         remarks,
     )

@@ -63,6 +63,22 @@ def inertia_diagonal(model: Any, position: Real) -> Real:
     return found / len(poses)
 
 
+def inertia_columns(model: Any, position: Real, dofs: slice) -> Real:
+    """Give ``[column, dof, sample]``: columns of the joint-space inertia, torque a unit of these accelerations."""
+    import mujoco
+
+    quiet, data = _quiet(model)
+    units = np.eye(quiet.nv)[dofs]
+    found, product = np.empty((len(units), quiet.nv, position.shape[1])), np.zeros(quiet.nv)
+    for sample, pose in enumerate(position.T):
+        data.qpos[:] = pose
+        mujoco.mj_forward(quiet, data)
+        for column, unit in enumerate(units):
+            mujoco.mj_mulM(quiet, data, product, unit)
+            found[column, :, sample] = product
+    return found
+
+
 def static_torque(model: Any, position: Real) -> Real:
     """Give ``[dof, sample]``: torque that holds each pose."""
     import mujoco

@@ -9,7 +9,6 @@ import pinocchio as pin
 from chladni_withheld.case import Matrix
 from chladni_withheld.robots.excitation import Rng
 
-#: How long a fall takes to become a hold: never, within a log.
 Way = Literal["hangs", "carried", "falls"]
 WAYS: tuple[Way, ...] = ("hangs", "carried", "falls")
 
@@ -105,7 +104,7 @@ def _rest(model: pin.Model) -> Matrix:
 
 
 def _draw_sensor(rng: Rng) -> Sensor:
-    rate_hz = float(rng.choice([100.0, 200.0, 250.0, 400.0, 500.0]))
+    rate_hz = float(rng.choice([100.0, 125.0, 200.0, 250.0, 500.0]))
     return Sensor(
         pose=pin.SE3(pin.exp3(rng.normal(size=3)), rng.uniform(-0.1, 0.1, 3)), rate_hz=rate_hz,
         begin_s=float(rng.uniform(0.0, 1.0 / rate_hz)),

@@ -143,7 +143,7 @@ class Motion:
         Place, quaternion, velocity and acceleration of a base that floats, the latter two in its own axes
         ``[19, sample]``; no rows of one that is fixed.
     imu
-        What an IMU on it feels, ``[6, sample]``.
+        What an IMU on it feels, at its own stamps: these, s, turning and acceleration less gravity ``[7, message]``.
     """
 
     t_s: Matrix
@@ -197,10 +197,10 @@ def simulate(machine: Machine, commands: Commands, t_s: Matrix, *, step_s: float
         if step == wanted[len(rows)]:
             rows.append(run.sample())
     found = [np.array(each).T for each in zip(*rows, strict=True)]
-    return Motion(t_s=t_s, **dict(zip(_SAMPLED, found, strict=True)))
+    return Motion(t_s=t_s, imu=run.sensed(begin), **dict(zip(_SAMPLED, found, strict=True)))
 
 
-_SAMPLED = ("reading", "speed", "acceleration", "asked", "given", "link", "link_speed", "base", "imu")
+_SAMPLED = ("reading", "speed", "acceleration", "asked", "given", "link", "link_speed", "base")
 
 
 class _Run:
@@ -302,8 +302,12 @@ class _Run:
             reading, speed, acceleration = self.theta, self.omega, self.turning
         else:
             reading, speed, acceleration = self.q, self.v, self.alpha
-        none = np.zeros(0)
-        return (reading + self.machine.offset, speed, acceleration, self.asked, self.given, self.q, self.v, none, none)
+        base = np.zeros(0)
+        return (reading + self.machine.offset, speed, acceleration, self.asked, self.given, self.q, self.v, base)
+
+    def sensed(self, _begin: float) -> Matrix:
+        """What an IMU felt, of motions that began then; a base that is fixed has none."""
+        return np.zeros((7, 0))
 
 
 class _AfloatRun(_Run):
@@ -316,6 +320,7 @@ class _AfloatRun(_Run):
         self.whole = let_float(machine.model)
         self.all = self.whole.createData()
         self.pose, self.twist, self.push = pin.SE3.Identity(), np.zeros(6), np.zeros(6)
+        self.felt: list[Matrix] = []
 
     def accelerated(self, t: float, joint: Matrix) -> Matrix:
         """Acceleration of the joints; the base goes its step."""
@@ -326,11 +331,21 @@ class _AfloatRun(_Run):
         )
         self.push, self.twist = found[:6], self.twist + self.h * found[:6]
         self.pose = self.pose * pin.exp6(pin.Motion(self.h * self.twist))
+        upright = self.pose.rotation.T @ self.whole.gravity.linear
+        self.felt.append(felt(self.holder.sensor, self.twist, self.push, upright))
         return found[6:]
 
     def sample(self) -> tuple[Matrix, ...]:
-        """With the base and its IMU."""
-        upright = self.pose.rotation.T @ self.whole.gravity.linear
+        """With the base."""
         base = np.concatenate([pin.SE3ToXYZQUAT(self.pose), self.twist, self.push])
-        imu = felt(self.holder.sensor, self.twist, self.push, upright)
-        return (*super().sample()[:-2], base, imu)
+        return (*super().sample()[:-1], base)
+
+    def sensed(self, begin: float) -> Matrix:
+        """Means over the sensor's periods, stamped at their ends."""
+        sensor = self.holder.sensor
+        count = round(1.0 / sensor.rate_hz / self.h)
+        first = round((sensor.begin_s - begin) / self.h) % count
+        steps = np.array(self.felt[first:])
+        means = steps[: len(steps) // count * count].reshape(-1, count, 6).mean(axis=1)
+        stamps = begin + self.h * (first + count * np.arange(1, len(means) + 1))
+        return np.vstack([stamps, means.T])

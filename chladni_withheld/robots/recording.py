@@ -5,7 +5,6 @@ from collections.abc import Mapping
 
 import numpy as np
 import pinocchio as pin
-from scipy.interpolate import CubicSpline
 
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import NS_PER_S, TimeSeries
@@ -44,8 +43,8 @@ def _imu(rng: Rng, scene: Scene, motion: Motion) -> tuple[TimeSeries, ...]:
     if scene.machine.base is None:
         return ()
     sensor = scene.machine.base.sensor
-    t_s = np.arange(sensor.begin_s + motion.t_s[0], motion.t_s[-1], 1.0 / sensor.rate_hz)
-    read = CubicSpline(motion.t_s, motion.imu, axis=1)(t_s)
+    t_s, read = motion.imu[0], motion.imu[1:]
+    t_s, read = t_s[t_s >= motion.t_s[0]], read[:, t_s >= motion.t_s[0]]
     rows = []
     for (constant, noise), part in zip((sensor.gyro, sensor.accelerometer), (read[:3], read[3:]), strict=True):
         rows.append(part + constant[:, None] + noise * rng.normal(size=part.shape))

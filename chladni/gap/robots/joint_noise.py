@@ -17,11 +17,26 @@ def steps_and_noise(values: Real, sample_rate_hz: float, stretches: Sequence[tup
 
     The density is that of the upper part of the band, and at least that of rounding to the step.
     """
-    a, b = max(stretches, key=lambda one: one[1] - one[0])
     steps = np.array([_step(row) for row in values])
-    lines, density = welch(values[:, a:b], sample_rate_hz, nperseg=min(_LINES, b - a), axis=-1)
-    upper = np.median(density[:, lines > _ABOVE * sample_rate_hz / 2.0], axis=-1)
+    upper = upper_density(values, sample_rate_hz, stretches, sample_rate_hz)
     return steps, np.maximum(upper, steps**2 / 12.0 / (sample_rate_hz / 2.0))
+
+
+def upper_density(
+    values: Real, sample_rate_hz: float, stretches: Sequence[tuple[int, int]], own_rate_hz: float
+) -> Real:
+    """Give the density of ``[row, sample]`` in the upper part of the band, unit^2/Hz.
+
+    Parameters
+    ----------
+    own_rate_hz
+        At which they were sampled before they came to this grid: beyond its band there is nothing.
+    """
+    a, b = max(stretches, key=lambda one: one[1] - one[0])
+    lines, density = welch(values[:, a:b], sample_rate_hz, nperseg=min(_LINES, b - a), axis=-1)
+    band_hz = min(sample_rate_hz, own_rate_hz) / 2.0
+    # The line at the band's end may hold but half of what the others do.
+    return np.asarray(np.median(density[:, (lines > _ABOVE * band_hz) & (lines <= band_hz)], axis=-1))
 
 
 def _step(row: Real) -> float:

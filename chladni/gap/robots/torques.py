@@ -11,8 +11,8 @@ import numpy as np
 from scipy.ndimage import correlate1d
 from scipy.signal import butter, sosfiltfilt
 
-from chladni.gap.robots.joint_noise import steps_and_noise, torque_noise
-from chladni.robots.dynamics import Needed, gravity_columns, needed_torque
+from chladni.gap.robots.joint_noise import steps_and_noise, torque_noise, upper_density
+from chladni.robots.dynamics import Needed, carried_columns, gravity_columns, needed_torque
 from chladni.robots.floating_base import BaseMotion, FloatingBase, at_origin, floating_base, place_on_base
 from chladni.robots.joint_log import JointLog
 from chladni.robots.robot import Robot, RobotJoint
@@ -238,6 +238,21 @@ class Torques:
         """What the motion needs, of every degree of freedom."""
         return needed_torque(self.robot, self.all_positions, *self._rates)
 
+    @cached_property
+    def carried(self) -> Real:
+        """``[6, joint, coarse]``: torque a unit of the acceleration of a base that floats, linear, then angular."""
+        if self.base is None:
+            return np.zeros((0, *self.position.shape))
+        return self.of_joints(carried_columns(self.robot, self.base, self.all_positions))
+
+    @cached_property
+    def held(self) -> Real | None:
+        """``[6, coarse]``: force and moment at a base that floats that its motion needs, in its own axes, N and N m.
+
+        Zero in free flight.
+        """
+        return None if self.base is None else self.need.torque[self.base.dof : self.base.dof + 6]
+
     def of_joints(self, dofs: Real) -> Real:
         """Rows of the log's joints among ``[..., dof, coarse]``."""
         return dofs[..., [one.dof for one in self.joints], :]
@@ -390,7 +405,26 @@ class Torques:
         found = torque_noise(self._steps[1], self.cutoff_hz, stiffness=kp, damping=kd + damping, inertia=inertia)
         if self.by_effort:
             found += steps_and_noise(self.fast_drive, self.log.sample_rate_hz, self.stretches)[1] * self.cutoff_hz
-        return np.sqrt(found)
+        return np.sqrt(found + self._noise_of_base)
+
+    @property
+    def _noise_of_base(self) -> Real | float:
+        """``[joint]``: variance that the noise of the IMU gives the missing torque."""
+        if self.base is None or self.log.imu is None:
+            return 0.0
+        imu, lever = self.log.imu, place_on_base(self.robot, self.base, self.log.imu.site)[1]
+        force, turning = (
+            float(np.mean(upper_density(one, self.log.sample_rate_hz, self.stretches, imu.sample_rate_hz)))
+            for one in (imu.linear_acceleration, imu.angular_velocity)
+        )
+        linear, angular = self.carried[:3], self.carried[3:]
+        # What turns the sensor moves the base's origin against it.
+        angular = angular - np.einsum("ka,ajs->kjs", np.cross(np.eye(3), lever), linear)
+        of_rate = (2.0 * np.pi) ** 2 * self.cutoff_hz**3 / 3.0
+        return np.asarray(
+            force * self.cutoff_hz * np.mean(np.sum(linear**2, axis=0), axis=-1)
+            + turning * of_rate * np.mean(np.sum(angular**2, axis=0), axis=-1)
+        )
 
     @cached_property
     def highest_noise(self) -> Real:

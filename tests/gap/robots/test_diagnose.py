@@ -113,7 +113,7 @@ def test_what_can_not_be_told_is_refused_with_what_to_do(tmp_path: Path) -> None
         diagnose_robot(robot, joint_log_of(robot, position))
     with pytest.raises(LogError, match="record a longer one"):
         diagnose_robot(robot, joint_log_of(robot, position[:, :100], command=command[:, :100]))
-    with pytest.raises(ModelError, match="its base floats"):
+    with pytest.raises(ModelError, match="no free joint carries it; give it one"):
         diagnose_robot(replace(robot, base="floating"), joint_log_of(robot, position, command=command))
 
 

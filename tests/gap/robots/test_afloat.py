@@ -1,0 +1,74 @@
+"""What is named of robots whose base nobody holds, by what their IMU feels."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chladni.gap.records.diagnosis import Diagnosis
+from chladni.gap.robots.diagnose import diagnose_robot
+from chladni.gap.robots.forward import simulated
+from chladni.gap.robots.torques import torques_of
+from chladni.robots.machine import as_described
+from chladni.signals.errors import LogError
+from tests.robots.afloat import biped, hung, walking
+
+pytest.importorskip("mujoco")
+
+SECONDS = 12.0
+
+
+def found_of(folder: Path, *, falls: bool = False, **machine: str) -> Diagnosis:
+    """The answer on a log of a machine that differs from the robot as described."""
+    log = hung(biped(folder, "machine/biped.xml", **machine), walking(SECONDS), falls=falls)
+    return diagnose_robot(biped(folder), log)
+
+
+def named(found: Diagnosis) -> set[tuple[str, str]]:
+    """Words and sites."""
+    return {(one.effect, one.site) for one in found.causes}
+
+
+@pytest.mark.parametrize("falls", [False, True])
+def test_a_robot_that_is_right_lacks_nothing(tmp_path: Path, falls: bool) -> None:
+    found = found_of(tmp_path, falls=falls)
+    assert (found.verdict, found.causes) == ("none", ())
+
+
+def test_friction_in_a_leg_is_named_with_its_size(tmp_path: Path) -> None:
+    found = found_of(tmp_path, left=' frictionloss="0.4"')
+    assert named(found) == {("coulomb_friction", "left_hip")}
+    assert found.causes[0].parameters["force"].value == pytest.approx(0.4, rel=0.1)
+    # Confirmed by simulation, on a base that moves as it did.
+    assert found.gap.by == "windows"
+    assert found.gap.after < 0.5 * found.gap.before
+
+
+def test_a_delay_of_all_commands(tmp_path: Path) -> None:
+    found = found_of(tmp_path, servo=' delay="0.012" nsample="40"')
+    assert named(found) == {("delay", "all commands")}
+    assert found.causes[0].parameters["delay"].value == pytest.approx(0.012, abs=1e-3)
+
+
+def test_the_simulation_of_what_was_described_follows_a_base_that_moves(tmp_path: Path) -> None:
+    robot = biped(tmp_path)
+    log = hung(robot, walking(6.0))
+    torques = torques_of(robot, log)
+    run = [(300, 1200)]
+    measured = log.position[:, 300:1200]
+    found = simulated(as_described(robot), torques, run)[:, 300:1200]
+    # Steps are of another length than the machine's, and the start is smoothed.
+    assert np.sqrt(np.mean((found - measured) ** 2)) < 0.004 * measured.std()
+    # On a base at rest the legs move otherwise.
+    level = np.zeros_like(log.imu.linear_acceleration) + [[0.0], [0.0], [9.81]]
+    still = replace(log.imu, site="trunk", angular_velocity=0.0 * level, linear_acceleration=level)
+    other = simulated(as_described(robot), torques_of(robot, replace(log, imu=still)), run)[:, 300:1200]
+    assert np.sqrt(np.mean((other - measured) ** 2)) > 0.01 * measured.std()
+
+
+def test_without_an_imu_the_joints_tell_nothing(tmp_path: Path) -> None:
+    robot = biped(tmp_path)
+    log = replace(hung(robot, walking(2.0)), imu=None)
+    with pytest.raises(LogError, match=r"base floats.*record one \(sensor_msgs/Imu\) on trunk.*base = \"fixed\""):
+        diagnose_robot(robot, log)
