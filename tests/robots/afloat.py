@@ -65,8 +65,8 @@ def walking(seconds: float) -> np.ndarray:
     )
 
 
-def hung(robot: Robot, command: np.ndarray, *, falls: bool = False) -> JointLog:
-    """What a machine logs that hangs from a cord, or falls."""
+def hung(robot: Robot, command: np.ndarray, *, falls: bool = False, stands_s: float = 0.0) -> JointLog:
+    """What a machine logs that hangs from a cord, or falls; that for a time is held at the ends of its calves."""
     import mujoco
 
     model, data = robot.model, mujoco.MjData(robot.model)
@@ -88,7 +88,14 @@ def hung(robot: Robot, command: np.ndarray, *, falls: bool = False) -> JointLog:
                 mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, trunk, speed, 0)
                 pull = CORD * (start - data.xpos[trunk]) - 10 * DAMPED * speed[3:]
                 twist = TWIST * data.xmat[trunk].reshape(3, 3) @ turn - DAMPED * speed[:3]
-                data.xfrc_applied[trunk] = [*pull, *twist]
+                feet = ("left_calf", "right_calf") if sample < stands_s * RATE_HZ else ()
+                data.xfrc_applied[trunk] = [*(0.0 if feet else 1.0) * pull, *twist]
+                for one in ("left_calf", "right_calf"):
+                    body = data.body(one)
+                    arm = body.xmat.reshape(3, 3) @ [0.0, 0.0, -0.2] - (body.xipos - body.xpos)
+                    push = pull / 2 if feet else np.zeros(3)
+                    # A force of a body acts at its centre of mass.
+                    data.xfrc_applied[body.id] = [*push, *np.cross(arm, push)]
             mujoco.mj_step(model, data)
             felt.append(data.sensordata.copy())
     # An IMU gives the mean about each of its samples: commands that step would be seen just after a step.

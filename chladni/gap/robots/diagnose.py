@@ -5,6 +5,7 @@ from collections.abc import Callable
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.robots.answer import Answer
 from chladni.gap.robots.solved import solved
+from chladni.gap.robots.support import require_in_the_air
 from chladni.gap.robots.torques import torques_of
 from chladni.robots.joint_log import JointLog
 from chladni.robots.robot import Robot
@@ -56,6 +57,7 @@ def diagnose_robot(
     tell = progress or (lambda _step, _share: None)
     tell("locating", 0.0)
     torques = torques_of(robot, log)
+    require_in_the_air(torques)
     tell("explaining", 0.2)
     found = solved(torques, leave_out, lambda share: tell("explaining", 0.2 + 0.6 * share))
     tell("measuring the closing", 0.9)

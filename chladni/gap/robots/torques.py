@@ -30,7 +30,7 @@ _FAST = 4.0
 #: Periods of the cutoff that both ends of a stretch lose to the filter.
 _ENDS = 3.0
 #: Least periods of the cutoff in a stretch.
-_LEAST = 12.0
+LEAST = 12.0
 #: Of the usual torque: what a rigid description is right to, unless a fit leaves less.
 _RIGHT = 0.02
 #: Of its usual speed: within this a joint could move either way, however fine its encoder.
@@ -79,11 +79,11 @@ class Torques:
     def stretches(self) -> tuple[tuple[int, int], ...]:
         """First and last sample of the stretches that are long enough."""
         bounds = [0, *self.log.breaks, self.log.position.shape[1]]
-        least = _LEAST / self.cutoff_hz * self.log.sample_rate_hz
+        least = LEAST / self.cutoff_hz * self.log.sample_rate_hz
         found = tuple((a, b) for a, b in pairwise(bounds) if b - a >= least)
         if not found:
             raise LogError(
-                f"{self.log.log}: no stretch of {_LEAST / self.cutoff_hz:.2g} s without a gap; record a longer one"
+                f"{self.log.log}: no stretch of {LEAST / self.cutoff_hz:.2g} s without a gap; record a longer one"
             )
         return found
 

@@ -72,3 +72,11 @@ def test_without_an_imu_the_joints_tell_nothing(tmp_path: Path) -> None:
     log = replace(hung(robot, walking(2.0)), imu=None)
     with pytest.raises(LogError, match=r"base floats.*record one \(sensor_msgs/Imu\) on trunk.*base = \"fixed\""):
         diagnose_robot(robot, log)
+
+
+def test_what_stands_is_refused_with_the_time_in_the_air(tmp_path: Path) -> None:
+    robot = biped(tmp_path)
+    with pytest.raises(LogError, match="held by its base, its legs in the air"):
+        diagnose_robot(robot, hung(robot, walking(6.0), stands_s=9.0))
+    with pytest.raises(LogError, match=r"stands on its last links for 4\.\d+ s.*from (5|6)\.\d+ to 1\d\.?\d* s after"):
+        diagnose_robot(robot, hung(robot, walking(12.0), stands_s=5.0))
