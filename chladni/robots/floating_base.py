@@ -99,8 +99,8 @@ def place_on_base(robot: Robot, base: FloatingBase, site: str) -> tuple[Real, Re
     while body != 1 + robot.links.index(base.link):
         if not body or model.body_jntnum[body]:
             raise ModelError(
-                f"{robot.name}: {visible(site)}, where the IMU sits, isn't fixed to the base {visible(base.link)}; name "
-                "a site or link on it as imu in [log] of the robot file, and record an IMU there"
+                f"{robot.name}: {visible(site)}, where the IMU sits, isn't fixed to the base {visible(base.link)}; "
+                "name a site or link on it as imu in [log] of the robot file, and record an IMU there"
             )
         own = _turned(model.body_quat[body])
         place, turned = own.apply(place) + model.body_pos[body], own * turned

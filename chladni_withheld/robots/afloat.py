@@ -60,7 +60,7 @@ class Afloat:
     def force(self, t: float, pose: pin.SE3, velocity: Matrix) -> Matrix:
         """Force and moment on the base at its origin, in its own axes ``[6]``; `velocity` in these, too."""
         hand = np.sum(self.way * np.sin(self.omega * t + self.phase), axis=1)
-        pull = self.linear[0] * (hand[:3] + [0.0, 0.0, self.sag] - pose.translation)
+        pull = self.linear[0] * (hand[:3] + np.array([0.0, 0.0, self.sag]) - pose.translation)
         turn = self.angular[0] * pin.log3(pose.rotation.T @ pin.exp3(hand[3:]))
         linear = pose.rotation.T @ pull - self.linear[1] * velocity[:3]
         return np.concatenate([linear, turn - self.angular[1] * velocity[3:]])
@@ -95,7 +95,8 @@ def draw_afloat(rng: Rng, model: pin.Model) -> Afloat:
         word=word, linear=(linear, 2.0 * ratio * float(np.sqrt(linear * mass))),
         angular=(angular, 2.0 * ratio * float(np.sqrt(angular * inertia))),
         way=size[:, None] * rng.normal(size=(6, 3)) / np.sqrt(3.0), omega=2.0 * np.pi * rng.uniform(0.1, 1.0, (6, 3)),
-        phase=rng.uniform(0.0, 2.0 * np.pi, (6, 3)), sag=mass * 9.81 / linear if held else 0.0, sensor=_draw_sensor(rng),
+        phase=rng.uniform(0.0, 2.0 * np.pi, (6, 3)), sag=mass * 9.81 / linear if held else 0.0,
+        sensor=_draw_sensor(rng),
     )  # fmt: skip
 
 

@@ -167,7 +167,8 @@ def _robot(scene: Scene, machine: Machine) -> dict[str, Any]:
     recorder, servo = scene.recorder, machine.servo
     inertias = [inertia.toDynamicParameters().tolist() for inertia in machine.model.inertias.tolist()[1:]]
     return {
-        "name": scene.robot.name, "base": "fixed" if machine.base is None else machine.base.word, "joints": list(scene.robot.joints), "links": list(scene.robot.links),
+        "name": scene.robot.name, "base": "fixed" if machine.base is None else machine.base.word,
+        "joints": list(scene.robot.joints), "links": list(scene.robot.links),
         "state_hz": recorder.state_hz, "command_hz": recorder.command_hz, "length_s": recorder.length_s,
         "resolution": recorder.resolution, "velocity": recorder.velocity, "effort": recorder.effort,
         "kp": servo.kp.tolist(), "kd": servo.kd.tolist(), "loop_s": servo.period_s,

@@ -185,7 +185,12 @@ def simulate(machine: Machine, commands: Commands, t_s: Matrix, *, step_s: float
     resolution
         Of the encoder that the servo reads, rad; zero for a perfect one.
     """
-    run = (_Run if machine.base is None else _AfloatRun)(machine, commands, step_s, resolution)
+    base = machine.base
+    run = (
+        _Run(machine, commands, step_s, resolution)
+        if base is None
+        else _AfloatRun(machine, base, commands, step_s, resolution)
+    )
     begin = commands.t_s[0]
     wanted = np.rint((t_s - begin) / step_s).astype(int)
     rows: list[tuple[Matrix, ...]] = []
@@ -313,10 +318,9 @@ class _Run:
 class _AfloatRun(_Run):
     """A machine whose base moves: `pose`, with spatial velocity `twist` and acceleration `push` in its own axes."""
 
-    def __init__(self, machine: Machine, commands: Commands, step_s: float, resolution: float) -> None:
+    def __init__(self, machine: Machine, base: Afloat, commands: Commands, step_s: float, resolution: float) -> None:
         super().__init__(machine, commands, step_s, resolution)
-        assert machine.base is not None
-        self.holder = machine.base
+        self.holder = base
         self.whole = let_float(machine.model)
         self.all = self.whole.createData()
         self.pose, self.twist, self.push = pin.SE3.Identity(), np.zeros(6), np.zeros(6)

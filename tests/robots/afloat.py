@@ -104,7 +104,11 @@ def hung(robot: Robot, command: np.ndarray, *, falls: bool = False, stands_s: fl
     sensed = (sums[every::every] - sums[:-every:every]).T / every
     log = joint_log_of(robot, position, command=command)
     imu = ImuLog(
-        topic="/imu", site="imu", angular_velocity=sensed[:3], linear_acceleration=sensed[3:], orientation=None,
+        topic="/imu",
+        site="imu",
+        angular_velocity=sensed[:3],
+        linear_acceleration=sensed[3:],
+        orientation=None,
         sample_rate_hz=RATE_HZ,
     )
     return replace(log, imu=imu)

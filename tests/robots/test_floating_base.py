@@ -20,8 +20,8 @@ pytest.importorskip("mujoco")
 RATE_HZ = 500.0
 LINK = """<link name="{0}"><inertial><origin xyz="0.01 {2} -0.05" rpy="0.1 0.2 0"/><mass value="{1}"/>
 <inertia ixx="0.02" iyy="0.025" izz="0.015" ixy="0.002" ixz="0" iyz="0.001"/></inertial></link>"""
-JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="{3}" rpy="0.3 0 0.1"/>
-<axis xyz="{4}"/><limit lower="-3" upper="3" effort="50" velocity="9"/></joint>"""
+JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="{3}"
+rpy="0.3 0 0.1"/><axis xyz="{4}"/><limit lower="-3" upper="3" effort="50" velocity="9"/></joint>"""
 URDF = (
     '<robot name="legs">'
     + LINK.format("trunk", 5, 0.03) + LINK.format("hip", 1, 0.02) + LINK.format("calf", 0.5, 0)
@@ -70,7 +70,11 @@ def test_torques_are_those_of_a_base_that_moves_in_the_world(tmp_path: Path) -> 
         pose = pose * pin.exp6(pin.Motion(middle / RATE_HZ))
     sensed = np.array(felt).T
     imu = ImuLog(
-        topic="/imu", site="imu", angular_velocity=sensed[:3], linear_acceleration=sensed[3:], orientation=None,
+        topic="/imu",
+        site="imu",
+        angular_velocity=sensed[:3],
+        linear_acceleration=sensed[3:],
+        orientation=None,
         sample_rate_hz=RATE_HZ,
     )
     order = [model.names.tolist().index(one.name) - 2 for one in robot.joints]
@@ -99,7 +103,9 @@ def test_the_base_is_that_of_the_joints(tmp_path: Path) -> None:
     trunk = data.body("trunk").xmat.reshape(3, 3)
     np.testing.assert_allclose(axes, trunk.T @ data.site("imu").xmat.reshape(3, 3), atol=1e-12)
     np.testing.assert_allclose(place, trunk.T @ (data.site("imu").xpos - data.body("trunk").xpos), atol=1e-12)
-    with pytest.raises(ModelError, match=r"left_calf, where the IMU sits, isn't fixed to the base trunk; name a site"):
+    with pytest.raises(
+        ModelError, match=r"left_calf, where the IMU sits, isn't fixed to the base trunk; name a site"
+    ):
         place_on_base(robot, base, "left_calf")
 
 

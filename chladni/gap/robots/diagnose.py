@@ -16,12 +16,12 @@ StepProgress = Callable[[str, float], None]
 #: Words of robots beside those of effects.md.
 ROBOT_WORDS = (
     "armature", "controller_gain", "coulomb_friction", "delay", "encoder_offset", "gain_error", "gravity_tilt",
-    "joint_spring", "lag", "load_friction", "payload", "quadratic_damping", "saturation", "stribeck_friction",
-    "viscous_friction",
+    "joint_spring", "lag", "load_friction", "misalignment", "payload", "quadratic_damping", "saturation",
+    "stribeck_friction", "viscous_friction",
 )  # fmt: skip
 #: Words of docs/robots.md that have no column yet: what they'd name is unknown, and leaving them out changes nothing.
 WITHOUT_COLUMN = (
-    "backlash", "dead_zone", "external_force", "hysteresis", "joint_elasticity", "misalignment", "one_sided_stop",
+    "backlash", "dead_zone", "external_force", "hysteresis", "joint_elasticity", "one_sided_stop",
     "rate_limit", "ripple",
 )  # fmt: skip
 

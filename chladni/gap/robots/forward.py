@@ -17,6 +17,7 @@ from chladni.signals.arrays import Mask, Real
 #: Least length of the blocks of which every other one judges, in periods of the cutoff.
 _PERIODS = 16.0
 _ROUNDING = 1e-6
+_ANGLES = ("gravity_tilt", "misalignment")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,13 +94,16 @@ class _Reading:
                 self._joints[term.site] = law(self._joints[term.site], term, values, self._torques)
         for name in self._torques.log.joints:
             self._set_drive(name)
-        tilts = [values for term, values in self._terms if term.word == "gravity_tilt"]
+        found = {term.word: values.tolist() for term, values in self._terms if term.word in _ANGLES}
+        about_x, about_y = found.get("gravity_tilt", (0.0, 0.0))
+        turned_x, turned_y, turned_z = found.get("misalignment", (0.0, 0.0, 0.0))
         return Machine(
             robot=self._robot,
             joints=tuple(self._joints[one.name] for one in self._robot.joints),
             inertial=self._inertial(),
-            tilt=(float(tilts[0][0]), float(tilts[0][1])) if tilts else (0.0, 0.0),
+            tilt=(about_x, about_y),
             couplings=tuple(self._couplings()),
+            imu_turned=(turned_x, turned_y, turned_z),
         )
 
     def _set_within(self, name: str) -> None:
@@ -287,16 +291,16 @@ def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -
     driven = Driven(
         asked=_asked(machine, torques, np.concatenate(at_s)), kind=_kinds(torques), every=every, step_s=step_s,
         position=torques.fast_position[:, starts], velocity=torques.fast_velocity[:, starts],
-        steps=np.array([one.size for one in at_s]), base=_base(torques, np.concatenate(at_s)),
+        steps=np.array([one.size for one in at_s]), base=_base(machine, torques, np.concatenate(at_s)),
     )  # fmt: skip
     found = np.full_like(log.position, np.nan)
     found[:, np.concatenate(samples)] = run(machine, names, driven)
     return found
 
 
-def _base(torques: Torques, at_s: Real) -> BaseMotion | None:
+def _base(machine: Machine, torques: Torques, at_s: Real) -> BaseMotion | None:
     """How a base that floats moves, as fast as joints are followed."""
-    moved = torques.fast_base
+    moved = torques.base_motion(torques.fast_hz, machine.imu_turned)
     if moved is None:
         return None
 

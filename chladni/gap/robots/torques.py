@@ -1,6 +1,6 @@
 """The torque that a robot's description lacks: what its drives gave, less what its motion needed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 from scipy.ndimage import correlate1d
 from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
 from chladni.gap.robots.joint_noise import steps_and_noise, torque_noise, upper_density
 from chladni.robots.dynamics import Needed, carried_columns, gravity_columns, needed_torque
@@ -154,14 +155,14 @@ class Torques:
         return found
 
     @property
-    def _fast_hz(self) -> float:
+    def fast_hz(self) -> float:
         """A few cutoffs."""
         return min(_FAST * self.cutoff_hz, 0.4 * self.log.sample_rate_hz)
 
     @cached_property
     def fast_position(self) -> Real:
         """``[joint, sample]`` of the log's grid, below a few cutoffs."""
-        return self._filtered(self.log.position, self._fast_hz)
+        return self._filtered(self.log.position, self.fast_hz)
 
     @cached_property
     def fast_velocity(self) -> Real:
@@ -195,18 +196,22 @@ class Torques:
         """The base, where it floats."""
         return floating_base(self.robot)
 
-    @cached_property
-    def fast_base(self) -> BaseMotion | None:
-        """``[axis, sample]`` of the log's grid: motion of a base that floats, below a few cutoffs."""
-        return self._base_motion(self._fast_hz)
+    def base_motion(self, cutoff_hz: float, turned: Sequence[float] = (0.0, 0.0, 0.0)) -> BaseMotion | None:
+        """Give the motion of a base that floats, as its IMU tells it below a cutoff.
 
-    def _base_motion(self, cutoff_hz: float) -> BaseMotion | None:
-        """Give the motion of a base that floats, as its IMU tells it below a cutoff."""
+        Parameters
+        ----------
+        turned
+            By which the IMU is turned from how it's described, a rotation vector in its own axes, rad.
+        """
         if self.base is None or self.log.imu is None:
             return None
         imu = self.log.imu
-        axes, place = place_on_base(self.robot, self.base, imu.site)
-        force, turning = (self._filtered(axes @ one, cutoff_hz) for one in (imu.linear_acceleration, imu.angular_velocity))
+        described, place = place_on_base(self.robot, self.base, imu.site)
+        axes = described @ Rotation.from_rotvec(turned).as_matrix()
+        force, turning = (
+            self._filtered(axes @ one, cutoff_hz) for one in (imu.linear_acceleration, imu.angular_velocity)
+        )
         felt = BaseMotion(force=force, angular_velocity=turning, angular_acceleration=self._rate(turning))
         return at_origin(place, felt)
 
@@ -222,9 +227,13 @@ class Torques:
     @cached_property
     def _rates(self) -> tuple[Real, Real]:
         """``[dof, coarse]``: velocities and accelerations."""
+        return self._rates_by(np.zeros(3))
+
+    def _rates_by(self, turned: Real) -> tuple[Real, Real]:
+        """Give them for an IMU that is turned."""
         still, places = np.zeros(self.robot.model.nv), [one.dof for one in self.joints]
         velocity, acceleration = (_laid(one, places, still) for one in (self.velocity, self.acceleration))
-        motion = self._base_motion(self.cutoff_hz)
+        motion = self.base_motion(self.cutoff_hz, turned.tolist())
         if self.base is not None and motion is not None:
             linear, angular = (slice(a, a + 3) for a in (self.base.dof, self.base.dof + 3))
             velocity[angular] = motion.angular_velocity[:, self.kept]
@@ -271,6 +280,13 @@ class Torques:
             moved[one.position] += step
             columns.append(-(needed_torque(self.robot, moved, *self._rates).torque - self.need.torque) / step)
         return self.of_joints(np.array(columns))
+
+    @cached_property
+    def turned(self) -> Real:
+        """``[3, joint, coarse]``: torque a radian that the IMU of a base that floats is turned by about its axes."""
+        step, needed = 1e-3, self.need.torque
+        moved = (needed_torque(self.robot, self.all_positions, *self._rates_by(step * one)) for one in np.eye(3))
+        return self.of_joints(np.array([(one.torque - needed) / step for one in moved]))
 
     def command(self, later_s: float = 0.0) -> Real:
         """``[joint, sample]`` of the log's grid: the command as it arrives, and later still; NaN without any."""
@@ -391,7 +407,7 @@ class Torques:
     @cached_property
     def noise_of_speed(self) -> Real:
         """``[joint]``: standard deviation of the fast velocity's noise."""
-        noise = np.sqrt(self._steps[1] * (2.0 * np.pi) ** 2 * self._fast_hz**3 / 3.0)
+        noise = np.sqrt(self._steps[1] * (2.0 * np.pi) ** 2 * self.fast_hz**3 / 3.0)
         usual = np.std(self.fast_velocity, axis=1)
         return np.asarray(np.maximum(noise, _STILL * usual) + 1e-12)
 
@@ -485,7 +501,9 @@ def _integral(at: Real, starts: Real, values: Real, sums: Real) -> Real:
 
 def torques_of(robot: Robot, log: JointLog) -> Torques:
     """Give the torques of a log."""
-    cutoff = min(CUTOFF_HZ, _MOST * log.sample_rate_hz)
+    # What is slower of two tells up to where both do.
+    imu_hz = np.inf if robot.base == "fixed" or log.imu is None else log.imu.sample_rate_hz
+    cutoff = min(CUTOFF_HZ, _MOST * min(log.sample_rate_hz, imu_hz))
     found = Torques(robot=robot, log=log, cutoff_hz=cutoff)
     if found.base is not None and log.imu is None:
         raise LogError(

@@ -268,10 +268,12 @@ def _readings(torques: Torques) -> Iterator[Term]:
 
 
 def _bodies(torques: Torques) -> Iterator[Term]:
+    angles = tuple(Number(name=name, unit="rad", scale=_TILT) for name in ("about_x", "about_y", "about_z"))
     if torques.base is None:
-        # Of a base that floats an IMU tells which way is down.
-        angles = tuple(Number(name=name, unit="rad", scale=_TILT) for name in ("about_x", "about_y"))
-        yield Term(word="gravity_tilt", site=WORLD, columns=torques.tilt, numbers=angles)
+        yield Term(word="gravity_tilt", site=WORLD, columns=torques.tilt, numbers=angles[:2])
+    elif torques.log.imu is not None:
+        # Which way is down an IMU tells.
+        yield Term(word="misalignment", site=torques.log.imu.site, columns=torques.turned, numbers=angles)
     numbers = inertial_numbers(torques.robot)
     columns = torques.of_joints(np.moveaxis(torques.need.regressor, (2, 3), (0, 1)))
     usual = _PAYLOAD * float(np.max(numbers[:, 0]))
