@@ -333,10 +333,10 @@ class _AfloatRun(_Run):
         found: Matrix = pin.aba(
             self.whole, self.all, q, np.concatenate([self.twist, self.v]), np.concatenate([force, joint])
         )
+        upright = self.pose.rotation.T @ self.whole.gravity.linear
+        self.felt.append(felt(self.holder.sensor, self.twist, found[:6], upright))
         self.push, self.twist = found[:6], self.twist + self.h * found[:6]
         self.pose = self.pose * pin.exp6(pin.Motion(self.h * self.twist))
-        upright = self.pose.rotation.T @ self.whole.gravity.linear
-        self.felt.append(felt(self.holder.sensor, self.twist, self.push, upright))
         return found[6:]
 
     def sample(self) -> tuple[Matrix, ...]:
