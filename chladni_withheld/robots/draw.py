@@ -65,7 +65,7 @@ def _words(kind: Kind, seed: int, index: int) -> list[str]:
     if kind == "leave_out":
         words = _LEFT_OUT
     if kind == "afloat":
-        words = ("coulomb_friction", "viscous_friction", "stribeck_friction", "joint_delay", "common_delay")
+        words = ("coulomb_friction", "viscous_friction", "joint_delay", "common_delay")
     if kind == "gains":
         # A gain that is off where all are would be the same twice.
         words = tuple(word for word in CAUSES if word not in ("gain_error", "controller_gain"))

@@ -117,3 +117,29 @@ def test_a_base_that_floats_is_one(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="its joints hang on several bases, a, b"):
         floating_base(load_robot(written(tmp_path, two, "two.xml")))
     assert floating_base(replace(robot, base="fixed")) is None
+
+
+def test_noise_of_an_imu_is_what_its_torques_shake_by(tmp_path: Path) -> None:
+    robot = biped(tmp_path)
+    rng, count = np.random.default_rng(1), 20000
+    level = np.zeros((3, count))
+    level[2] = 9.81
+    still = np.zeros((4, count))
+    quiet = ImuLog(
+        topic="/imu",
+        site="imu",
+        angular_velocity=np.zeros((3, count)),
+        linear_acceleration=level,
+        orientation=None,
+        sample_rate_hz=RATE_HZ,
+    )
+    shaken = replace(
+        quiet,
+        angular_velocity=quiet.angular_velocity + 0.02 * rng.normal(size=(3, count)),
+        linear_acceleration=quiet.linear_acceleration + 0.3 * rng.normal(size=(3, count)),
+    )
+    log = joint_log_of(robot, still, command=still, rate_hz=RATE_HZ)
+    one, other = (torques_of(robot, replace(log, imu=imu)) for imu in (quiet, shaken))
+    shakes = np.std(other.missing - one.missing, axis=1)
+    # The filter's edge isn't sharp: what is about the cutoff counts for half in noise that grows with frequency.
+    np.testing.assert_allclose(other.sensed_noise, shakes, rtol=0.25)

@@ -56,3 +56,23 @@ def torque_noise(density: Real, cutoff_hz: float, *, stiffness: Real, damping: R
     omega = 2.0 * np.pi * np.linspace(0.0, cutoff_hz, _LINES)
     gain = np.abs(stiffness[:, None] + 1j * omega * damping[:, None] - omega**2 * inertia[:, None]) ** 2
     return np.asarray(density * np.mean(gain, axis=1) * cutoff_hz)
+
+
+def imu_noise(force: float, turning: float, cutoff_hz: float, *, carried: Real, place: Real) -> Real:
+    """Give ``[joint]``: variance of the torque that an IMU's noise seems to need below a cutoff.
+
+    Parameters
+    ----------
+    force, turning
+        Densities of the accelerometer, (m/s^2)^2/Hz, and the gyroscope, (rad/s)^2/Hz, of each axis.
+    carried
+        ``[6, joint, sample]`` torque a unit of the base's acceleration, linear, then angular.
+    place
+        ``[3]`` of the IMU on the base, m.
+    """
+    linear = carried[:3]
+    # What turns the sensor moves the base's origin against it.
+    angular = carried[3:] - np.einsum("ka,ajs->kjs", np.cross(np.eye(3), place), linear)
+    of_rate = (2.0 * np.pi) ** 2 * cutoff_hz**3 / 3.0
+    by_force, by_turning = (np.mean(np.sum(one**2, axis=0), axis=-1) for one in (linear, angular))
+    return np.asarray(force * cutoff_hz * by_force + turning * of_rate * by_turning)

@@ -12,7 +12,7 @@ from scipy.ndimage import correlate1d
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
-from chladni.gap.robots.joint_noise import steps_and_noise, torque_noise, upper_density
+from chladni.gap.robots.joint_noise import imu_noise, steps_and_noise, torque_noise, upper_density
 from chladni.robots.dynamics import Needed, carried_columns, gravity_columns, needed_torque
 from chladni.robots.floating_base import BaseMotion, FloatingBase, at_origin, floating_base, place_on_base
 from chladni.robots.joint_log import JointLog
@@ -428,19 +428,12 @@ class Torques:
         """``[joint]``: variance that the noise of the IMU gives the missing torque."""
         if self.base is None or self.log.imu is None:
             return 0.0
-        imu, lever = self.log.imu, place_on_base(self.robot, self.base, self.log.imu.site)[1]
+        imu, place = self.log.imu, place_on_base(self.robot, self.base, self.log.imu.site)[1]
         force, turning = (
             float(np.mean(upper_density(one, self.log.sample_rate_hz, self.stretches, imu.sample_rate_hz)))
             for one in (imu.linear_acceleration, imu.angular_velocity)
         )
-        linear, angular = self.carried[:3], self.carried[3:]
-        # What turns the sensor moves the base's origin against it.
-        angular = angular - np.einsum("ka,ajs->kjs", np.cross(np.eye(3), lever), linear)
-        of_rate = (2.0 * np.pi) ** 2 * self.cutoff_hz**3 / 3.0
-        return np.asarray(
-            force * self.cutoff_hz * np.mean(np.sum(linear**2, axis=0), axis=-1)
-            + turning * of_rate * np.mean(np.sum(angular**2, axis=0), axis=-1)
-        )
+        return imu_noise(force, turning, self.cutoff_hz, carried=self.carried, place=place)
 
     @cached_property
     def highest_noise(self) -> Real:
