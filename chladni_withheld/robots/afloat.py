@@ -1,4 +1,4 @@
-"""A base that nobody fixed: it hangs, is carried or falls, and an IMU on it tells how it moves."""
+"""A base that nobody fixed: it hangs or is carried, and an IMU on it tells how it moves."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -9,8 +9,7 @@ import pinocchio as pin
 from chladni_withheld.case import Matrix
 from chladni_withheld.robots.excitation import Rng
 
-Way = Literal["hangs", "carried", "falls"]
-WAYS: tuple[Way, ...] = ("hangs", "carried", "falls")
+Way = Literal["hangs", "carried"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +35,7 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Afloat:
-    """What holds the base: a spring and a damper to a hand that may move; stiffnesses are zero in a fall.
+    """What holds the base: a spring and a damper to a hand that may move.
 
     Attributes
     ----------
@@ -82,20 +81,19 @@ def let_float(model: pin.Model) -> pin.Model:
 
 
 def draw_afloat(rng: Rng, model: pin.Model) -> Afloat:
-    """A base that hangs from a soft spring, that a hand carries about, or that falls."""
-    word: Way = WAYS[int(rng.integers(len(WAYS)))]
+    """A base that hangs from a soft spring, or that a hand carries about."""
+    word: Way = "hangs" if rng.random() < 0.5 else "carried"
     mass = sum(inertia.mass for inertia in model.inertias)
     inertia = np.trace(pin.crba(let_float(model), let_float(model).createData(), _rest(model))[3:6, 3:6]) / 3.0
-    held = 0.0 if word == "falls" else 1.0
     # A cord hangs softly; hands are stiffer, and damp more.
     hz, ratio = (rng.uniform(0.7, 1.5, 2), 0.1) if word == "hangs" else (rng.uniform(1.5, 3.0, 2), 0.4)
-    linear, angular = (held * size * (2.0 * np.pi * own) ** 2 for size, own in zip((mass, inertia), hz, strict=True))
-    size = {"hangs": 0.0, "carried": 1.0, "falls": 0.0}[word] * np.array([0.1] * 3 + [0.25] * 3)
+    linear, angular = (size * (2.0 * np.pi * own) ** 2 for size, own in zip((mass, inertia), hz, strict=True))
+    size = float(word == "carried") * np.array([0.1] * 3 + [0.25] * 3)
     return Afloat(
         word=word, linear=(linear, 2.0 * ratio * float(np.sqrt(linear * mass))),
         angular=(angular, 2.0 * ratio * float(np.sqrt(angular * inertia))),
         way=size[:, None] * rng.normal(size=(6, 3)) / np.sqrt(3.0), omega=2.0 * np.pi * rng.uniform(0.1, 1.0, (6, 3)),
-        phase=rng.uniform(0.0, 2.0 * np.pi, (6, 3)), sag=mass * 9.81 / linear if held else 0.0,
+        phase=rng.uniform(0.0, 2.0 * np.pi, (6, 3)), sag=mass * 9.81 / linear,
         sensor=_draw_sensor(rng),
     )  # fmt: skip
 

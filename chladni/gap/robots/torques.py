@@ -255,6 +255,15 @@ class Torques:
         return self.of_joints(carried_columns(self.robot, self.base, self.all_positions))
 
     @cached_property
+    def late_base(self) -> Real:
+        """``[joint, coarse]``: missing torque a second that the IMU of a base that floats comes late."""
+        motion = self.base_motion(self.cutoff_hz)
+        if motion is None:
+            return np.zeros_like(self.position)
+        rate = self._rate(np.concatenate([motion.force, motion.angular_acceleration]))
+        return np.einsum("ajk,ak->jk", self.carried, rate[:, self.kept])
+
+    @cached_property
     def held(self) -> Real | None:
         """``[6, coarse]``: force and moment at a base that floats that its motion needs, in its own axes, N and N m.
 

@@ -25,6 +25,8 @@ _GAIN, _DELAY_S, _LAG_S, _READING, _TILT, _MASS, _BY_LOAD = 0.3, 0.01, 0.02, 0.0
 _PAYLOAD, _REACH_M = 0.3, 0.1
 #: Zero-g offset of an accelerometer, m/s^2, one sigma: sensors of robots are within two or three hundredths of g.
 _ZERO_G = 0.1
+#: The same of its delay, s: low-pass filters of such sensors take 2 to 20 ms by their data sheets.
+_IMU_S = 0.005
 #: One over a gain, less one, of a drive that gives ten times what it's asked for.
 _MOST_GAIN = -0.9
 
@@ -319,9 +321,10 @@ def tolerances(torques: Torques) -> tuple[Real, list[str]]:
             damped = torques.kd[row] * torques.velocity[row]
             both = _at(torques, row, torques.wanted[row] + damped, damped) * tolerance.gains
             found += zip((f"{joint.name}.kp", f"{joint.name}.kd"), both, strict=True)
-    # What an accelerometer reads at rest is off by a constant.
-    zeros = zip("xyz", _ZERO_G * torques.carried[:3], strict=False)
-    found += ((f"imu.{axis}", -column) for axis, column in zeros)
+    if torques.base is not None:
+        # What an accelerometer reads at rest is off by a constant, and filters of an IMU take their time.
+        found += zip(("imu.x", "imu.y", "imu.z"), _ZERO_G * torques.carried[:3], strict=True)
+        found.append(("imu.late", _IMU_S * torques.late_base))
     if not torques.by_effort and torques.log.command_kind == "position":
         # A digital servo holds what it reads for a period.
         found.append(("loop", -LOOP_S * torques.loop))

@@ -16,6 +16,7 @@ from chladni.robots.joint_log import JointLog
 from chladni.robots.machine import as_described
 from chladni.signals.errors import LogError
 from tests.robots.afloat import biped, hung, walking
+from tests.robots.machines import RATE_HZ
 
 pytest.importorskip("mujoco")
 
@@ -31,6 +32,23 @@ def found_of(folder: Path, *, falls: bool = False, **machine: str) -> Diagnosis:
 def named(found: Diagnosis) -> set[tuple[str, str]]:
     """Words and sites."""
     return {(one.effect, one.site) for one in found.causes}
+
+
+def test_filters_of_an_imu_are_no_cause(tmp_path: Path) -> None:
+    robot, late = biped(tmp_path), 1
+    log = hung(robot, walking(SECONDS))
+    imu = replace(
+        log.imu,
+        angular_velocity=np.roll(log.imu.angular_velocity, late, axis=1),
+        linear_acceleration=np.roll(log.imu.linear_acceleration, late, axis=1),
+    )
+    found = diagnose_robot(robot, replace(log, imu=imu))
+    assert (found.verdict, found.causes) == ("none", ())
+    torques = torques_of(robot, replace(log, imu=imu))
+    right = torques_of(robot, log).missing
+    # Of first order: half of the delay times the motion's own omega is left.
+    left = torques.missing - late / RATE_HZ * torques.late_base - right
+    assert left.std() < 0.1 * (torques.missing - right).std()
 
 
 @pytest.mark.parametrize("falls", [False, True])

@@ -71,7 +71,7 @@ def test_work_of_the_motors_is_the_energy_of_the_links():
 
 
 def test_a_base_that_floats_obeys_mechanics_and_its_imu_feels_it():
-    stage = next(one for seed in range(21, 60) if (one := staged(seed, floats=True)[1]).scene.machine.base.sag)
+    _, stage = staged(21, floats=True)
     motion, machine = stage.quiet, stage.scene.machine
     base, sensor = machine.base, machine.base.sensor
     pose, twist, push = motion.base[:7], motion.base[7:13], motion.base[13:]
