@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -24,6 +25,8 @@ _ACCELEROMETER: Final = "linear_acceleration"
 _ATTITUDE: Final = "orientation"
 # What resampling needs beyond the states, at the lowest rates of IMUs.
 _BEYOND_S: Final = 1.0
+# Nearer to 1 than to what holds against gravity.
+_LIKE_G: Final = sqrt(9.81)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -112,8 +115,21 @@ def read_imu(robot: Robot, log: Log, states: TimeSeries) -> tuple[ImuLog | None,
             orientation=_filled_attitude(values[6:]),
             sample_rate_hz=min(one.sample_rate_hz for one in groups),
         ),
-        remarks,
+        (*remarks, *_tell_unit(values[3:6], topic)),
     )
+
+
+def _tell_unit(force: Real, topic: str) -> tuple[str, ...]:
+    """Say when an accelerometer feels as little as if it were in units of g."""
+    felt = np.linalg.norm(force, axis=0)
+    usual = float(np.median(felt[np.isfinite(felt)])) if np.isfinite(felt).any() else 0.0
+    if not 1 / _LIKE_G < usual < _LIKE_G:
+        return ()
+    told = (
+        f"{visible(topic)} feels {usual:.3g} m/s^2 at most times, as in a fall; if that is in g, say so in a setup "
+        f'file (--setup): [[channel]] path = "{topic}.{_ACCELEROMETER}.x", unit = "g", and so for y and z'
+    )
+    return (told,)
 
 
 def _chosen(robot: Robot, log: Log, topics: set[str]) -> tuple[str | None, str, tuple[str, ...]]:
