@@ -261,7 +261,7 @@ class Torques:
         if motion is None:
             return np.zeros_like(self.position)
         rate = self._rate(np.concatenate([motion.force, motion.angular_acceleration]))
-        return np.einsum("ajk,ak->jk", self.carried, rate[:, self.kept])
+        return np.asarray(np.einsum("ajk,ak->jk", self.carried, rate[:, self.kept]))
 
     @cached_property
     def held(self) -> Real | None:
