@@ -22,6 +22,8 @@ Kind = Literal[
     "value_and_effect", "all_joints", "ordinary", "gains",
     "afloat", "afloat_none",
 ]  # fmt: skip
+#: Kinds of which nothing has to be hidden.
+QUIET: tuple[Kind, ...] = ("none", "parameters", "afloat_none")
 #: Effect of a wrong number; its site is the number's name, such as ``elbow.stiffness``.
 PARAMETER = "parameter"
 #: The same for all cases: a log's date tells nothing.

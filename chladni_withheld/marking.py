@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from chladni_withheld import folders
-from chladni_withheld.case import PARAMETER, Kind
+from chladni_withheld.case import PARAMETER, QUIET, Kind
 from chladni_withheld.folders import RESULT_FORMAT, Result, Truth, read_as
 from chladni_withheld.vocabulary import FAMILY_OF, OUTSIDE
 
@@ -168,7 +168,7 @@ class Mark:
         """Whether the answer is what its kind of case asks for."""
         if self.kind in STRANGE:
             return self.recognised
-        if self.kind in ("none", "parameters", "afloat_none"):
+        if self.kind in QUIET:
             return self.verdict == ("parameters" if self.kind == "parameters" else "none")
         return self.is_right if self.kind in ("effect", "faint") else self.all_found()
 

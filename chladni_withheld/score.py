@@ -12,7 +12,7 @@ from scipy.stats import binomtest
 
 from chladni.signals.errors import SetupError
 from chladni_withheld.campaign import generator_in
-from chladni_withheld.case import PARAMETER, Kind
+from chladni_withheld.case import PARAMETER, QUIET, Kind
 from chladni_withheld.folders import (
     FAILURE_FORMAT,
     RESULT_FORMAT,
@@ -149,7 +149,7 @@ def _clear(one: Mark) -> bool:
 
 
 def _quiet(one: Mark) -> bool:
-    return one.kind in ("none", "parameters", "afloat_none")
+    return one.kind in QUIET
 
 
 def _of(*kinds: Kind) -> Callable[[Mark], bool]:

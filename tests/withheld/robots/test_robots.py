@@ -107,6 +107,26 @@ def test_an_afloat_case_has_its_imu_in_its_files():
     assert case.effects[0].severity_tuned > 3.0
 
 
+def test_a_robot_afloat_that_is_right_is_a_whole_truth(tmp_path):
+    assert make_cases(tmp_path, count=1, seed=2, generator="robots", kinds=["afloat_none=1"]) == 1
+    (case,) = case_folders(tmp_path)
+    assert truth_of_case(tmp_path, case)["effects"] == []
+
+
+def test_what_is_told_of_bases_that_float_is_scored():
+    truth = {"kind": "afloat", "ratio": 9.0,
+             "effects": [{"effect": "delay", "site": "knee", "parameters": {"delay": 0.01}}]}  # fmt: skip
+    right, wrong = (answer(("delay", site, {"delay": {"value": 0.01}})) for site in ("knee", "hip"))
+    none = {"kind": "afloat_none", "effects": []}
+    quiet = answer(verdict="none")
+    score = scored([mark("a", truth, right), mark("b", truth, wrong), mark("c", none, quiet), mark("d", none, wrong)])
+    robots = score["robots"]
+    assert (robots["afloat_site"]["right"], robots["afloat_site"]["count"]) == (1, 2)
+    assert (robots["afloat_wrong"]["right"], robots["afloat_wrong"]["count"]) == (2, 4)
+    assert mark("c", none, quiet).whole_is_right
+    assert not mark("d", none, wrong).whole_is_right
+
+
 def test_friction_takes_energy_and_never_gives_any():
     rng, stage = staged(2)
     cause = ALL_CAUSES["coulomb_friction"](rng, stage, 1)
