@@ -16,10 +16,14 @@ Matrix = NDArray[np.float64]
 #: word fits. ``topology``: a link that the model lacks. ``value``: one number or several wrong by up to a factor of
 #: ten. ``value_and_effect``: wrong numbers and effects together. Of robots: ``all_joints``: friction in every joint.
 #: ``ordinary``: friction, a common delay and a heavier link. ``gains``: one effect, and a servo of unknown gains.
+#: ``afloat``: friction or a delay in one leg, and nobody holds the base; ``afloat_none``: the same, right.
 Kind = Literal[
     "effect", "none", "parameters", "two", "three", "faint", "leave_out", "outside", "topology", "value",
     "value_and_effect", "all_joints", "ordinary", "gains",
+    "afloat", "afloat_none",
 ]  # fmt: skip
+#: Kinds of which nothing has to be hidden.
+QUIET: tuple[Kind, ...] = ("none", "parameters", "afloat_none")
 #: Effect of a wrong number; its site is the number's name, such as ``elbow.stiffness``.
 PARAMETER = "parameter"
 #: The same for all cases: a log's date tells nothing.

@@ -22,7 +22,7 @@ from chladni.io.regular_file import read_text
 from chladni.io.validation import ModelT, validated
 from chladni.signals.errors import SetupError
 from chladni.signals.wording import MOST_SHOWN, counted, shown
-from chladni_withheld.case import Kind
+from chladni_withheld.case import QUIET, Kind
 from chladni_withheld.vocabulary import FAMILY_OF
 
 RESULT_FORMAT, FAILURE_FORMAT = "chladni.gap/1", "chladni.blind-failure/1"
@@ -110,7 +110,7 @@ class Truth(_Document):
 
     @model_validator(mode="after")
     def _hides_something(self) -> Self:
-        if not self.effects and self.kind not in ("none", "parameters"):
+        if not self.effects and self.kind not in QUIET:
             raise ValueError(f"kind is {self.kind}, and effects holds none")
         return self
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from chladni_withheld import folders
-from chladni_withheld.case import PARAMETER, Kind
+from chladni_withheld.case import PARAMETER, QUIET, Kind
 from chladni_withheld.folders import RESULT_FORMAT, Result, Truth, read_as
 from chladni_withheld.vocabulary import FAMILY_OF, OUTSIDE
 
@@ -18,7 +18,7 @@ CLEAR_RATIO = 3.0
 #: Cases that no word of the run's catalogue is right for, and cases whose model is wrong in itself.
 STRANGE: tuple[Kind, ...] = ("leave_out", "outside")
 MODEL_WRONG: tuple[Kind, ...] = ("topology", "value", "value_and_effect")
-ROBOTS_OWN: tuple[Kind, ...] = ("all_joints", "ordinary", "gains")
+ROBOTS_OWN: tuple[Kind, ...] = ("all_joints", "ordinary", "gains", "afloat")
 _NAMEABLE: tuple[Kind, ...] = ("effect", "parameters", "two", "three", *MODEL_WRONG, *ROBOTS_OWN)
 #: The number of a robot's cause that is held against the truth, and whether as a share of it.
 _VALUES: Mapping[str, tuple[str, bool]] = {
@@ -168,8 +168,8 @@ class Mark:
         """Whether the answer is what its kind of case asks for."""
         if self.kind in STRANGE:
             return self.recognised
-        if self.kind in ("none", "parameters"):
-            return self.verdict == self.kind
+        if self.kind in QUIET:
+            return self.verdict == ("parameters" if self.kind == "parameters" else "none")
         return self.is_right if self.kind in ("effect", "faint") else self.all_found()
 
     @property

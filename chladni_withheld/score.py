@@ -12,7 +12,7 @@ from scipy.stats import binomtest
 
 from chladni.signals.errors import SetupError
 from chladni_withheld.campaign import generator_in
-from chladni_withheld.case import PARAMETER, Kind
+from chladni_withheld.case import PARAMETER, QUIET, Kind
 from chladni_withheld.folders import (
     FAILURE_FORMAT,
     RESULT_FORMAT,
@@ -149,7 +149,7 @@ def _clear(one: Mark) -> bool:
 
 
 def _quiet(one: Mark) -> bool:
-    return one.kind in ("none", "parameters")
+    return one.kind in QUIET
 
 
 def _of(*kinds: Kind) -> Callable[[Mark], bool]:
@@ -255,6 +255,10 @@ QUESTIONS = (
              counts=lambda one: one.site_is_right, at_least=0.85, optional=True),
     Question(key="robots.gains", what="unknown gains: each within 5 %", of=_of("gains"),
              counts=lambda one: [off <= 0.05 for off in one.gains], optional=True),
+    Question(key="robots.afloat_site", what="a base that floats: the cause's site", of=_of("afloat"),
+             counts=lambda one: one.site_is_right, at_least=0.80, optional=True),
+    Question(key="robots.afloat_wrong", what="a base that floats: a wrong name with 0.6 or more",
+             of=_of("afloat", "afloat_none"), counts=_wrong(0.6), at_most=0.0, optional=True),
     Question(key="robots.delay", what="a common delay: within 1 ms", of=_hides("delay", "all commands"),
              counts=_values_within("delay", 0.001), optional=True),
     Question(key="robots.payload", what="a payload: within 5 %", of=_hides("payload"),

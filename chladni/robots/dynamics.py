@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.robots.floating_base import FloatingBase
 from chladni.robots.robot import Robot
 from chladni.signals.arrays import Real
 from chladni.signals.value import Value
@@ -57,11 +58,24 @@ def motion_torque(robot: Robot, position: Real, velocity: Real, acceleration: Re
     return torque_alone(robot.model, position, velocity, acceleration)
 
 
+def carried_columns(robot: Robot, base: FloatingBase, position: Real) -> Real:
+    """Give ``[6, dof, sample]``: torque a unit of the base's acceleration, linear, then angular, in its own axes.
+
+    Parameters
+    ----------
+    position
+        ``[qpos, sample]`` with the base's axes those of the world.
+    """
+    from chladni.robots.mujoco_motion import inertia_columns
+
+    return inertia_columns(robot.model, position, slice(base.dof, base.dof + 6))
+
+
 def gravity_columns(robot: Robot, position: Real) -> Real:
     """Give ``[2, dof, sample]``: torque a radian that the base is turned by, about its x and y axes."""
     from chladni.robots.mujoco_motion import tilted, torque_alone
 
-    step, still = 1e-3, np.zeros_like(position)
+    step, still = 1e-3, np.zeros((robot.model.nv, position.shape[1]))
     level = torque_alone(robot.model, position, still, still)
     turned = [torque_alone(tilted(robot.model, axis, step), position, still, still) for axis in (0, 1)]
     return (np.stack(turned) - level) / step

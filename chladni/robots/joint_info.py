@@ -213,7 +213,8 @@ def _findings(robot: Robot, log: JointLog, joints: Sequence[JointInfo]) -> Itera
         yield f"samples of the joints come in {len(log.breaks) + 1} stretches: what lies between isn't bridged"
     if robot.base == "floating":
         remedy = "record its IMU, and name it as imu in [log] of a robot file"
-        yield f"the base floats, and joints don't tell its pose; {remedy if log.imu is None else 'its IMU is read'}"
+        told = remedy if log.imu is None else "its IMU is read"
+        yield f"the base floats, and joints don't tell how it moves; {told}"
 
 
 def _names(robot: Robot, log: JointLog) -> Iterator[str]:

@@ -155,7 +155,8 @@ class _Reader:
         if effort is not None and command is not None and self._is_same_effort(state, command):
             effort = None
         held = None if kind is None else self._laid(read.commands, commanded, series.samples)
-        kept = self._kept(position, velocity, effort, held, series.sample_rate_hz)
+        imu, remarks = read_imu(self._robot, self._log, series)
+        kept = self._kept(position, velocity, effort, held, imu, series.sample_rate_hz)
 
         def at(values: Real | None) -> Real | None:
             return None if values is None else np.ascontiguousarray(values[:, kept])
@@ -171,7 +172,6 @@ class _Reader:
                 own if np.array_equal(row, was, equal_nan=True) else (kept / series.sample_rate_hz, row)
                 for own, row, was in zip(messages, held, before, strict=True)
             ]
-        imu, remarks = read_imu(self._robot, self._log, series, kept)
         self._remarks += remarks
         return JointLog(
             log=self._file,
@@ -187,7 +187,7 @@ class _Reader:
             command_messages=None if held is None else tuple(messages),
             command_kind=kind,
             command_rate_hz=read.command_rate_hz,
-            imu=imu,
+            imu=None if imu is None else imu.at(kept),
             breaks=tuple((np.flatnonzero(np.diff(kept) > 1) + 1).tolist()),
             state_topic=state.label,
             command_topic=None if command is None or kind is None else command.label,
@@ -268,16 +268,26 @@ class _Reader:
             self._joints = tuple(name for name in self._joints if name not in dead)
 
     def _kept(
-        self, position: Real, velocity: Real | None, effort: Real | None, held: Real | None, rate_hz: float
-    ) -> Index:
+        self, position: Real, velocity: Real | None, effort: Real | None, held: Real | None, imu: ImuLog | None,
+        rate_hz: float,
+    ) -> Index:  # fmt: skip
         """Samples that have all that is there at all."""
         measured = np.isfinite(position).all(axis=0) & _filled(velocity, position) & _filled(effort, position)
         there = measured & _filled(held, position)
         kept = np.flatnonzero(there)
         if not kept.size:
             raise LogError(f"{self._file}: states and commands have no time in common; name another --command TOPIC")
-        self._tell_left_out(measured, there, rate_hz)
-        return kept
+        self._tell_left_out("commands", measured, there, rate_hz)
+        if imu is None or self._robot.base == "fixed":
+            return kept
+        # Nothing is told of joints on a base whose motion isn't known.
+        known = there & imu.there
+        if not known.any():
+            raise LogError(
+                f"{self._file}: states and {visible(imu.topic)} have no time in common; record them together"
+            )
+        self._tell_left_out(f"samples of {visible(imu.topic)}", there, known, rate_hz)
+        return np.flatnonzero(known)
 
     def _measured(self, name: str, values: Real, position: Real) -> Real | None:
         """Give velocities or efforts; None where nobody fills them."""
@@ -346,18 +356,18 @@ class _Reader:
 
     # --- what is told ---
 
-    def _tell_left_out(self, measured: Mask, there: Mask, rate_hz: float) -> None:
-        """Say what part of the states has no command."""
+    def _tell_left_out(self, what: str, measured: Mask, there: Mask, rate_hz: float) -> None:
+        """Say what part of the states has no command, or no IMU."""
         places = np.flatnonzero(measured)
         both = np.flatnonzero(there)
         before, after = both[0] - places[0], places[-1] - both[-1]
         if before > 1:
-            self._remarks.append(f"commands begin {before / rate_hz:.3g} s after the states: that part is left out")
+            self._remarks.append(f"{what} begin {before / rate_hz:.3g} s after the states: that part is left out")
         if after > 1:
-            self._remarks.append(f"commands end {after / rate_hz:.3g} s before the states: that part is left out")
+            self._remarks.append(f"{what} end {after / rate_hz:.3g} s before the states: that part is left out")
         inside = np.count_nonzero(measured[both[0] : both[-1] + 1]) - both.size
         if inside:
-            self._remarks.append(f"{inside / rate_hz:.3g} s amid the log lack commands: left out, and not bridged")
+            self._remarks.append(f"{inside / rate_hz:.3g} s amid the log lack {what}: left out, and not bridged")
 
     def _require_radians(self, position: Real) -> None:
         """Refuse degrees: motions that are many times as large as the description's range."""

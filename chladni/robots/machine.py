@@ -184,6 +184,8 @@ class Machine:
         Angles by which the base is turned about its x and y axes, rad.
     couplings
         Between neighbours.
+    imu_turned
+        Rotation vector in its own axes by which the IMU of a base that floats is turned from how it's described, rad.
     """
 
     robot: Robot
@@ -191,6 +193,7 @@ class Machine:
     inertial: Real
     tilt: tuple[float, float] = (0.0, 0.0)
     couplings: tuple[Coupling, ...] = ()
+    imu_turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def as_described(robot: Robot) -> Machine:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from chladni.robots.dynamics import inertial_numbers
+from chladni.robots.floating_base import floating_base
 from chladni.robots.joint_laws import Between, followed, further_laws, tooth_of
 from chladni.robots.loading import made_of
 from chladni.robots.machine import about_centre
@@ -19,6 +20,7 @@ from chladni.robots.mujoco_motion import gravity_of, inertia_rms
 
 if TYPE_CHECKING:
     from chladni.robots.description import Description
+    from chladni.robots.floating_base import BaseMotion
     from chladni.robots.machine import Machine, MachineJoint
     from chladni.signals.arrays import Index, Real
 
@@ -54,6 +56,8 @@ class Driven:
         Steps from one sample that is given back to the next.
     step_s
         Of the simulation.
+    base
+        How a base that floats moves, at the steps of `asked`; None of one that is fixed.
     """
 
     asked: Real
@@ -63,6 +67,7 @@ class Driven:
     steps: Index
     every: int
     step_s: float
+    base: BaseMotion | None = None
 
 
 def longest_step_s(machine: Machine, names: Sequence[str]) -> float:
@@ -102,7 +107,8 @@ def model_of(machine: Machine, names: Sequence[str]) -> Any:
         if one.stiffness or one.torque:
             _set_spring(model, one)
     model.dof_armature[held] += _HELD
-    model.opt.gravity[:] = gravity_of(model, machine.tilt)
+    # A base that floats is carried by what it feels, gravity included.
+    model.opt.gravity[:] = gravity_of(model, machine.tilt) if machine.robot.base == "fixed" else 0.0
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
 
@@ -187,6 +193,7 @@ class _Run:
         self._between = Between.of(self._joints, self._inertia(), driven.step_s)
         self._set_drives()
         self._laws = [*self._friction_laws(), *self._pulls(), *further_laws(self._joints, self._data, self._dofs)]
+        self._base = floating_base(machine.robot)
 
     def _row(self, name: str) -> Real:
         return np.array([getattr(one, name) for one in self._joints], dtype=np.float64)
@@ -281,8 +288,9 @@ class _Run:
         places, dofs, kp, laws, between = self._places, self._dofs, self._kp, self._laws, self._between
         ahead = np.ascontiguousarray(self._forward[:, span].T)
         path = np.full_like(ahead, np.nan)
-        bound = self._bound()
+        bound, carry = self._bound(), self._carried(span)
         for place in range(len(ahead)):
+            carry(place)
             position, velocity = qpos[places], qvel[dofs]
             if between.any:
                 path[place] = between.logged(position)
@@ -299,6 +307,29 @@ class _Run:
             if not abs(float(qvel @ qvel)) < _ASTRAY:
                 break
         return path
+
+    def _carried(self, span: slice) -> Callable[[int], None]:
+        """Give what makes a base that floats feel at each step what it felt: it's as heavy as what holds it."""
+        base, moved = self._base, self._driven.base
+        if base is None or moved is None:
+            return lambda _: None
+        turn, data = self._mujoco.mju_rotVecQuat, self._data
+        quaternion, speed, push = (
+            data.qpos[base.position + 3 : base.position + 7],
+            data.qvel[base.dof : base.dof + 6],
+            data.qfrc_applied[base.dof : base.dof + 6],
+        )
+        quaternion[:] = (1.0, 0.0, 0.0, 0.0)
+        force, spin = (np.ascontiguousarray(one[:, span].T) for one in (moved.force, moved.angular_acceleration))
+        turning, felt = np.ascontiguousarray(moved.angular_velocity[:, span].T), np.zeros(3)
+
+        def carry(place: int) -> None:
+            turn(felt, force[place], quaternion)
+            # Uniform motion is not felt.
+            speed[:3], speed[3:] = 0.0, turning[place]
+            push[:3], push[3:] = _HELD * felt, _HELD * spin[place]
+
+        return carry
 
     def _bound(self) -> Callable[[Real, Real], Real]:
         """Give what limits and lags make of a torque whose damping is implicit."""

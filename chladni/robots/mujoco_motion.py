@@ -63,12 +63,28 @@ def inertia_rms(model: Any, position: Real) -> Real:
     return np.asarray(np.sqrt(found / len(poses)))
 
 
+def inertia_columns(model: Any, position: Real, dofs: slice) -> Real:
+    """Give ``[column, dof, sample]``: columns of the joint-space inertia, torque a unit of these accelerations."""
+    import mujoco
+
+    quiet, data = _quiet(model)
+    units = np.eye(quiet.nv)[dofs]
+    found, product = np.empty((len(units), quiet.nv, position.shape[1])), np.zeros(quiet.nv)
+    for sample, pose in enumerate(position.T):
+        data.qpos[:] = pose
+        mujoco.mj_forward(quiet, data)
+        for column, unit in enumerate(units):
+            mujoco.mj_mulM(quiet, data, product, unit)
+            found[column, :, sample] = product
+    return found
+
+
 def torque_alone(model: Any, position: Real, velocity: Real, acceleration: Real) -> Real:
     """Give ``[dof, sample]``: the torque of `walk`."""
     import mujoco
 
     quiet, data = _quiet(model)
-    torque = np.empty_like(position)
+    torque = np.empty((quiet.nv, position.shape[1]))
     for sample, (pose, speed, rate) in enumerate(zip(position.T, velocity.T, acceleration.T, strict=True)):
         data.qpos[:], data.qvel[:], data.qacc[:] = pose, speed, rate
         mujoco.mj_inverse(quiet, data)

@@ -158,6 +158,9 @@ def _held_by_none(machine: Machine, *, delay_held: bool) -> Iterator[str]:
         yield from _not_held(one)
         if one.gain != 1.0 and (one.servo is None or (one.servo.kind == "effort" and one.servo.actuator is None)):
             yield f"{one.joint.name}: {one.gain:.4g} of the asked torque arrives; no actuator says so"
+    if any(machine.imu_turned):
+        told = ", ".join(f"{angle:.3g}" for angle in machine.imu_turned)
+        yield f"the IMU is turned by {told} rad about its own axes"
     delays = {one.delay_s for one in machine.joints if one.servo is not None or described[one.joint.name].servo}
     if len(delays) > 1 and not delay_held:
         told = ", ".join(f"{one.joint.name} {1e3 * one.delay_s:.3g} ms" for one in machine.joints if one.delay_s > 0)

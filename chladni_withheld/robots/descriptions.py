@@ -160,9 +160,10 @@ def _bound(joint: ET.Element) -> None:
     limit.attrib.update({"lower": "-3", "upper": "3"})
 
 
-def _child(joint: ET.Element) -> str:
-    child = joint.find("child")
-    return "" if child is None else child.get("link", "")
+def child(joint: ET.Element) -> str:
+    """Link that a joint moves."""
+    found = joint.find("child")
+    return "" if found is None else found.get("link", "")
 
 
 def _mount(root: ET.Element, last: ET.Element, tool: Tool) -> None:
@@ -172,15 +173,23 @@ def _mount(root: ET.Element, last: ET.Element, tool: Tool) -> None:
     ET.SubElement(inertial, "mass", value=f"{tool.mass:.4f}")
     around = f"{tool.mass * tool.radius**2:.6f}"
     ET.SubElement(inertial, "inertia", ixx=around, iyy=around, izz=around, ixy="0", ixz="0", iyz="0")
-    joint = ET.SubElement(root, "joint", name="tool_mount", type="fixed")
-    ET.SubElement(joint, "origin", xyz="0 0 0", rpy="0 0 0")
-    ET.SubElement(joint, "parent", link=_child(last))
-    ET.SubElement(joint, "child", link="tool")
+    fix(root, child(last), "tool", xyz=np.zeros(3), rpy=np.zeros(3))
+
+
+def fix(root: ET.Element, parent: str, link: str, *, xyz: Matrix, rpy: Matrix) -> None:
+    """Fix a link to another one; it's made where it's not there."""
+    if root.find(f"link[@name='{link}']") is None:
+        ET.SubElement(root, "link", name=link)
+    joint = ET.SubElement(root, "joint", name=f"{link}_mount", type="fixed")
+    place, turn = (" ".join(f"{one:.9g}" for one in values) for values in (xyz, rpy))
+    ET.SubElement(joint, "origin", xyz=place, rpy=turn)
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=link)
 
 
 def _read(name: str, urdf: str, moving: list[ET.Element]) -> Description:
     model = pin.buildModelFromXML(urdf)
-    links = {joint.get("name", ""): _child(joint) for joint in moving}
+    links = {joint.get("name", ""): child(joint) for joint in moving}
     limits = {joint.get("name", ""): joint.find("limit") for joint in moving}
     joints = tuple(model.names[1:])
 

@@ -16,7 +16,7 @@ from chladni_withheld.robots.cause import Cause, Stage
 from chladni_withheld.robots.causes import CAUSES, OUTSIDE_CAUSES
 from chladni_withheld.robots.excitation import Rng
 from chladni_withheld.robots.machine import Machine, Motion
-from chladni_withheld.robots.recording import URDF, robot_toml, topics
+from chladni_withheld.robots.recording import URDF, described, robot_toml, topics
 from chladni_withheld.robots.scene import INERTIA_SIGMA, RefusedError, Scene, draw_scene, rounded
 from chladni_withheld.robots.severity import lacking, severity
 from chladni_withheld.vocabulary import FAMILY_OF
@@ -24,10 +24,11 @@ from chladni_withheld.vocabulary import FAMILY_OF
 DEFAULT: Mapping[Kind, int] = MappingProxyType(
     {
         "effect": 100, "none": 24, "two": 30, "faint": 12, "leave_out": 16, "outside": 24, "all_joints": 16,
-        "ordinary": 20, "gains": 20,
+        "ordinary": 20, "gains": 20, "afloat": 20, "afloat_none": 10,
     }
 )  # fmt: skip
 _MOST_DRAWS = 300
+_AFLOAT: tuple[Kind, ...] = ("afloat", "afloat_none")
 #: A clear cause leaves at least so many times what the log can't tell when inertias take what they may; and at most.
 CLEAR, TOO_CLEAR = 3.0, 300.0
 #: An ordinary robot's inertias are known so well, and one link is heavier by the share that users report.
@@ -63,6 +64,8 @@ def _words(kind: Kind, seed: int, index: int) -> list[str]:
     words: tuple[str, ...] = tuple(OUTSIDE_CAUSES) if kind == "outside" else tuple(CAUSES)
     if kind == "leave_out":
         words = _LEFT_OUT
+    if kind == "afloat":
+        words = ("coulomb_friction", "viscous_friction", "joint_delay", "common_delay")
     if kind == "gains":
         # A gain that is off where all are would be the same twice.
         words = tuple(word for word in CAUSES if word not in ("gain_error", "controller_gain"))
@@ -71,9 +74,9 @@ def _words(kind: Kind, seed: int, index: int) -> list[str]:
 
 
 def _drawn(rng: Rng, kind: Kind, words: Sequence[str], refused: Sequence[str]) -> WithheldCase:
-    exact = kind == "none" and bool(rng.random() < 0.5)
+    exact = kind in ("none", "afloat_none") and bool(rng.random() < 0.5)
     sigma = ORDINARY_SIGMA if kind == "ordinary" else INERTIA_SIGMA
-    scene = draw_scene(rng, inertia=0.0 if exact else sigma, declared=sigma)
+    scene = draw_scene(rng, inertia=0.0 if exact else sigma, declared=sigma, floats=kind in _AFLOAT)
     if kind == "gains":
         scene = _doubtful(rng, scene)
     stage = Stage(scene=scene, quiet=scene.motion())
@@ -86,7 +89,7 @@ def _drawn(rng: Rng, kind: Kind, words: Sequence[str], refused: Sequence[str]) -
     _require_fair(kind, told)
     whole = severity(scene, lacking(scene, scene.machine.model, motion), motion) if causes else None
     return WithheldCase(
-        kind=kind, model=robot_toml(scene), model_file="robot.toml", beside={URDF: scene.robot.urdf},
+        kind=kind, model=robot_toml(scene), model_file="robot.toml", beside={URDF: described(scene)},
         topics=topics(rng, scene, motion), effects=tuple(told), ratio=None if whole is None else whole[0],
         ratio_tuned=None if whole is None else whole[1], excitation=(scene.excitation,),
         starts_in_motion=bool(np.abs(motion.speed[:, 0]).max() > 0.01), leave_out=_leave_out(rng, kind, told),
@@ -164,7 +167,8 @@ def _robot(scene: Scene, machine: Machine) -> dict[str, Any]:
     recorder, servo = scene.recorder, machine.servo
     inertias = [inertia.toDynamicParameters().tolist() for inertia in machine.model.inertias.tolist()[1:]]
     return {
-        "name": scene.robot.name, "joints": list(scene.robot.joints), "links": list(scene.robot.links),
+        "name": scene.robot.name, "base": "fixed" if machine.base is None else machine.base.word,
+        "joints": list(scene.robot.joints), "links": list(scene.robot.links),
         "state_hz": recorder.state_hz, "command_hz": recorder.command_hz, "length_s": recorder.length_s,
         "resolution": recorder.resolution, "velocity": recorder.velocity, "effort": recorder.effort,
         "kp": servo.kp.tolist(), "kd": servo.kd.tolist(), "loop_s": servo.period_s,
@@ -209,5 +213,5 @@ def _ordinary(rng: Rng, stage: Stage, words: Sequence[str]) -> list[Cause]:
 ALL_CAUSES = {**CAUSES, **OUTSIDE_CAUSES}
 PLOTS: Mapping[Kind, Plot] = {
     "effect": _one, "faint": _one, "none": _none, "two": _two, "all_joints": _all_joints, "ordinary": _ordinary,
-    "gains": _one, "leave_out": _one, "outside": _one,
+    "gains": _one, "leave_out": _one, "outside": _one, "afloat": _one, "afloat_none": _none,
 }  # fmt: skip

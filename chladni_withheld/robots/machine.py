@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from chladni_withheld.case import Matrix
+from chladni_withheld.robots.afloat import Afloat, felt, let_float
 
 #: Torque that the world adds at the joints: ``load(model, data, t, q, v) -> N m``.
 Load = Callable[[pin.Model, pin.Data, float, Matrix, Matrix], Matrix]
@@ -111,6 +112,8 @@ class Machine:
         Reading of each encoder minus the truth, rad.
     loads
         Further torques at the joints.
+    base
+        What holds it; None of one that is fixed.
     """
 
     model: pin.Model
@@ -119,6 +122,7 @@ class Machine:
     transmission: Transmission
     offset: Matrix
     loads: tuple[Load, ...] = field(default=())
+    base: Afloat | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,6 +139,11 @@ class Motion:
         Torque that the loop asked for, and that arrived, N m.
     link, link_speed
         Where the links truly were.
+    base
+        Place, quaternion, velocity and acceleration of a base that floats, the latter two in its own axes
+        ``[19, sample]``; no rows of one that is fixed.
+    imu
+        What an IMU on it feels, at its own stamps: these, s, turning and acceleration less gravity ``[7, message]``.
     """
 
     t_s: Matrix
@@ -145,6 +154,8 @@ class Motion:
     given: Matrix
     link: Matrix
     link_speed: Matrix
+    base: Matrix
+    imu: Matrix
 
     def every(self, stride: int) -> "Motion":
         """Fewer samples of it."""
@@ -174,7 +185,12 @@ def simulate(machine: Machine, commands: Commands, t_s: Matrix, *, step_s: float
     resolution
         Of the encoder that the servo reads, rad; zero for a perfect one.
     """
-    run = _Run(machine, commands, step_s, resolution)
+    base = machine.base
+    run = (
+        _Run(machine, commands, step_s, resolution)
+        if base is None
+        else _AfloatRun(machine, base, commands, step_s, resolution)
+    )
     begin = commands.t_s[0]
     wanted = np.rint((t_s - begin) / step_s).astype(int)
     rows: list[tuple[Matrix, ...]] = []
@@ -185,11 +201,11 @@ def simulate(machine: Machine, commands: Commands, t_s: Matrix, *, step_s: float
         run.advance(t)
         if step == wanted[len(rows)]:
             rows.append(run.sample())
-    found = np.moveaxis(np.array(rows), 0, 2)
-    return Motion(t_s=t_s, **dict(zip(_SAMPLED, found, strict=True)))
+    found = [np.array(each).T for each in zip(*rows, strict=True)]
+    return Motion(t_s=t_s, imu=run.sensed(begin), **dict(zip(_SAMPLED, found, strict=True)))
 
 
-_SAMPLED = ("reading", "speed", "acceleration", "asked", "given", "link", "link_speed")
+_SAMPLED = ("reading", "speed", "acceleration", "asked", "given", "link", "link_speed", "base")
 
 
 class _Run:
@@ -247,7 +263,7 @@ class _Run:
             joint = joint - self._rubbing(joint)
         for load in machine.loads:
             joint = joint + load(machine.model, self.data, t, self.q, self.v)
-        self.alpha = pin.aba(machine.model, self.data, self.q, self.v, joint)
+        self.alpha = self.accelerated(t, joint)
         self.v = self.v + h * self.alpha
         self.q = self.q + h * self.v
         if self.any_soft:
@@ -256,6 +272,11 @@ class _Run:
             self.theta = np.where(self.soft, self.theta + h * self.omega, self.q)
         else:
             self.omega, self.theta, self.turning = self.v, self.q, self.alpha
+
+    def accelerated(self, _t: float, joint: Matrix) -> Matrix:
+        """Acceleration of the joints by their torques."""
+        found: Matrix = pin.aba(self.machine.model, self.data, self.q, self.v, joint)
+        return found
 
     def _passed(self) -> Matrix:
         """Torque in the transmissions: nothing inside the play, and no pull of the damper."""
@@ -286,4 +307,49 @@ class _Run:
             reading, speed, acceleration = self.theta, self.omega, self.turning
         else:
             reading, speed, acceleration = self.q, self.v, self.alpha
-        return (reading + self.machine.offset, speed, acceleration, self.asked, self.given, self.q, self.v)
+        base = np.zeros(0)
+        return (reading + self.machine.offset, speed, acceleration, self.asked, self.given, self.q, self.v, base)
+
+    def sensed(self, _begin: float) -> Matrix:
+        """What an IMU felt, of motions that began then; a base that is fixed has none."""
+        return np.zeros((7, 0))
+
+
+class _AfloatRun(_Run):
+    """A machine whose base moves: `pose`, with spatial velocity `twist` and acceleration `push` in its own axes."""
+
+    def __init__(self, machine: Machine, base: Afloat, commands: Commands, step_s: float, resolution: float) -> None:
+        super().__init__(machine, commands, step_s, resolution)
+        self.holder = base
+        self.whole = let_float(machine.model)
+        self.all = self.whole.createData()
+        self.pose, self.twist, self.push = pin.SE3.Identity(), np.zeros(6), np.zeros(6)
+        self.felt: list[Matrix] = []
+
+    def accelerated(self, t: float, joint: Matrix) -> Matrix:
+        """Acceleration of the joints; the base goes its step."""
+        force = self.holder.force(t, self.pose, self.twist)
+        q = np.concatenate([pin.SE3ToXYZQUAT(self.pose), self.q])
+        found: Matrix = pin.aba(
+            self.whole, self.all, q, np.concatenate([self.twist, self.v]), np.concatenate([force, joint])
+        )
+        upright = self.pose.rotation.T @ self.whole.gravity.linear
+        self.felt.append(felt(self.holder.sensor, self.twist, found[:6], upright))
+        self.push, self.twist = found[:6], self.twist + self.h * found[:6]
+        self.pose = self.pose * pin.exp6(pin.Motion(self.h * self.twist))
+        return found[6:]
+
+    def sample(self) -> tuple[Matrix, ...]:
+        """With the base."""
+        base = np.concatenate([pin.SE3ToXYZQUAT(self.pose), self.twist, self.push])
+        return (*super().sample()[:-1], base)
+
+    def sensed(self, begin: float) -> Matrix:
+        """Means over the sensor's periods, stamped at their ends."""
+        sensor = self.holder.sensor
+        count = round(1.0 / sensor.rate_hz / self.h)
+        first = round((sensor.begin_s - begin) / self.h) % count
+        steps = np.array(self.felt[first:])
+        means = steps[: len(steps) // count * count].reshape(-1, count, 6).mean(axis=1)
+        stamps = begin + self.h * (first + count * np.arange(1, len(means) + 1))
+        return np.vstack([stamps, means.T])

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from chladni_withheld.case import Matrix
+from chladni_withheld.robots.afloat import draw_afloat
 from chladni_withheld.robots.descriptions import SOURCES, Description, Tool, describe
 from chladni_withheld.robots.excitation import Rng, draw_reference, draw_room
 from chladni_withheld.robots.machine import Commands, Friction, Machine, Motion, Servo, Transmission, simulate
@@ -89,9 +90,11 @@ class Scene:
         return found
 
 
-def draw_scene(rng: Rng, *, inertia: float = INERTIA_SIGMA, declared: float | None = None) -> Scene:
+def draw_scene(
+    rng: Rng, *, inertia: float = INERTIA_SIGMA, declared: float | None = None, floats: bool = False
+) -> Scene:
     """A robot whose inertias are off by `inertia`, one sigma, where the user's file says `declared`."""
-    robot = _draw_robot(rng)
+    robot = _draw_robot(rng, floats=floats)
     recorder = _draw_recorder(rng)
     room = draw_room(rng, robot)
     word, reference = draw_reference(rng, room, recorder.length_s)
@@ -107,14 +110,15 @@ def draw_scene(rng: Rng, *, inertia: float = INERTIA_SIGMA, declared: float | No
     servo = _draw_servo(rng, robot, model, commands)
     count = len(robot.joints)
     machine = Machine(model=model, servo=servo, friction=Friction.none(count), transmission=Transmission.rigid(count),
-                      offset=np.zeros(count))  # fmt: skip
+                      offset=np.zeros(count), base=draw_afloat(rng, model) if floats else None)  # fmt: skip
     tolerance = {"inertia": inertia if declared is None else declared, "gains": 0.0}
     return Scene(robot=robot, machine=machine, commands=commands, recorder=recorder, excitation=word,
                   gains=(servo.kp, servo.kd), tolerance=tolerance)  # fmt: skip
 
 
-def _draw_robot(rng: Rng) -> Description:
-    name = str(rng.choice(sorted(SOURCES)))
+def _draw_robot(rng: Rng, *, floats: bool) -> Description:
+    # Legs have a base that floats.
+    name = str(rng.choice(sorted(one for one in SOURCES if not (floats and SOURCES[one].tool))))
     mass = rng.uniform(0.5, 2.0)
     centre = (*np.round(rng.uniform(-0.04, 0.04, 2), 3).tolist(), round(float(rng.uniform(0.03, 0.1)), 3))
     tool = Tool(mass=mass, centre=centre, radius=float(rng.uniform(0.04, 0.08))) if SOURCES[name].tool else None

@@ -1,11 +1,14 @@
 """How far a cause stands out of what the log can't tell: encoders, and inertias inside their tolerance."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
 from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfiltfilt
 
 from chladni_withheld.case import Matrix
+from chladni_withheld.robots.afloat import let_float
 from chladni_withheld.robots.machine import Motion
 from chladni_withheld.robots.scene import Scene
 
@@ -20,13 +23,23 @@ _MOST_SIGMAS = 3.0
 
 def lacking(scene: Scene, model: pin.Model, motion: Motion) -> Matrix:
     """Torque that the motion needs and a servo without what is hidden doesn't give, ``[joint, sample]``."""
-    needed = _inverse(model, motion.reading, motion.speed, motion.acceleration)
+    needed = _inverse(model, motion, motion.reading, motion.speed, motion.acceleration)
     return needed - _asked(scene, motion.t_s, motion.reading, motion.speed)
 
 
-def _inverse(model: pin.Model, q: Matrix, v: Matrix, a: Matrix) -> Matrix:
-    data = model.createData()
-    return np.array([pin.rnea(model, data, *each) for each in zip(q.T, v.T, a.T, strict=True)]).T
+def _inverse(model: pin.Model, motion: Motion, *course: Matrix) -> Matrix:
+    whole, all_three = _on_base(model, motion, course)
+    data = whole.createData()
+    found = np.array([pin.rnea(whole, data, *each) for each in zip(*all_three, strict=True)]).T
+    return np.asarray(found[-course[0].shape[0] :])
+
+
+def _on_base(model: pin.Model, motion: Motion, course: Sequence[Matrix]) -> tuple[pin.Model, tuple[Matrix, ...]]:
+    """The model, and positions, velocities, accelerations ``[sample, number]``, with those of a base that floats."""
+    if not motion.base.size:
+        return model, tuple(one.T for one in course)
+    base = motion.base[:7], motion.base[7:13], motion.base[13:]
+    return let_float(model), tuple(np.vstack(both).T for both in zip(base, course, strict=True))
 
 
 def _asked(scene: Scene, t_s: Matrix, q: Matrix, v: Matrix) -> Matrix:
@@ -53,7 +66,7 @@ def noise_of(scene: Scene, motion: Motion) -> Matrix:
         q = smooth(reading, rate_hz)
         v = np.gradient(q, 1.0 / rate_hz, axis=1)
         a = np.gradient(v, 1.0 / rate_hz, axis=1)
-        errors.append(_inverse(scene.robot.model, q, v, a) - _asked(scene, motion.t_s, q, v))
+        errors.append(_inverse(scene.robot.model, motion, q, v, a) - _asked(scene, motion.t_s, q, v))
     made_up = np.sqrt(np.mean((errors[0] - errors[1]) ** 2, axis=1))
     floor = FLOOR * motion.given.std(axis=1)
     found: Matrix = np.hypot(made_up, floor)
@@ -89,11 +102,11 @@ def severity(scene: Scene, difference: Matrix, motion: Motion, *, but: int = -1)
 def _inertia_columns(scene: Scene, motion: Motion, but: int) -> Matrix:
     """Torque of one sigma of every link's mass, centre and inertia: ``[joint, number, sample]``."""
     model, sigma = scene.robot.model, scene.tolerance["inertia"]
-    data = model.createData()
-    tables = np.array([
-        pin.computeJointTorqueRegressor(model, data, *each)
-        for each in zip(motion.reading.T, motion.speed.T, motion.acceleration.T, strict=True)
-    ])  # fmt: skip
+    whole, course = _on_base(model, motion, (motion.reading, motion.speed, motion.acceleration))
+    data = whole.createData()
+    tables = np.array([pin.computeJointTorqueRegressor(whole, data, *each) for each in zip(*course, strict=True)])
+    # Rows and columns of a base that floats come first.
+    tables = tables[:, -model.nv :, -10 * model.nv :]
     columns = []
     for link in set(range(model.nv)) - {but}:
         inertia = model.inertias[link + 1]

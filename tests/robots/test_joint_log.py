@@ -397,8 +397,8 @@ def test_an_array_of_commands_needs_names_from_the_robot_file(tmp_path: Path) ->
 # --- the base ---
 
 
-def with_imu(folder: Path, topics=("/imu",)) -> Path:
-    """A log of states at 250 Hz, and of an IMU at the same times that turns and is level."""
+def with_imu(folder: Path, topics=("/imu",), span_s=(0.0, 4.0), upright=9.81) -> Path:
+    """A log of states at 250 Hz, and of an IMU at the same times, or for a part, that turns and is level."""
     position = motion(4, RATE_HZ)
     with LogMaker(folder / "imu.mcap") as log:
         state = log.ros2("/joint_states", "sensor_msgs/msg/JointState", JOINT_STATE)
@@ -406,8 +406,9 @@ def with_imu(folder: Path, topics=("/imu",)) -> Path:
         for place in range(1000):
             stamp_ns = START_NS + place * 4_000_000
             log.write(state, joint_state(stamp_ns, JOINTS, position[:, place].tolist()), stamp_ns)
-            for sensor in sensors:
-                log.write(sensor, imu(stamp_ns, (0, 0, 9.81), (place / 1000, 0, 0)), stamp_ns)
+            there = span_s[0] <= place / RATE_HZ < span_s[1]
+            for sensor in sensors if there else ():
+                log.write(sensor, imu(stamp_ns, (0, 0, upright), (place / 1000, 0, 0)), stamp_ns)
     return folder / "imu.mcap"
 
 
@@ -422,12 +423,41 @@ def test_the_only_imu_is_that_of_a_base_that_floats(tmp_path: Path) -> None:
     assert "/imu is taken as the IMU of the base, at imu_link" in told(found)
 
 
+def test_joints_count_where_a_base_that_floats_has_its_imu(tmp_path: Path) -> None:
+    found = matched(tmp_path, with_imu(tmp_path, span_s=(0.4, 3.0)), text=AFLOAT)
+    assert found.time_s[0] == pytest.approx(0.4)
+    assert found.time_s[-1] == pytest.approx(2.996)
+    assert found.position.shape[1] == found.imu.angular_velocity.shape[1] == found.imu.there.sum()
+    assert "samples of /imu begin 0.4 s after the states" in told(found)
+    assert "samples of /imu end 1 s before the states" in told(found)
+    with pytest.raises(LogError, match="states and /imu have no time in common; record them together"):
+        matched(tmp_path, with_imu(tmp_path, span_s=(2.5, 4.0)), text=AFLOAT, end_s=2.0)
+    # A base that is fixed needs none.
+    names = '[log]\nimu = { topic = "/imu", site = "hand" }\n'
+    assert matched(tmp_path, with_imu(tmp_path, span_s=(0.4, 3.0)), robot_file=names).time_s[0] == 0.0
+
+
 def test_the_robot_file_names_the_imu(tmp_path: Path) -> None:
     names = '[log]\nimu = { topic = "/imu", site = "hand" }\n'
     assert matched(tmp_path, with_imu(tmp_path), robot_file=names).imu.site == "hand"
     assert matched(tmp_path, with_imu(tmp_path)).imu is None
     with pytest.raises(LogError, match=r"no topic '/imu2'.*did you mean /imu"):
         matched(tmp_path, with_imu(tmp_path), robot_file=names.replace("/imu", "/imu2"))
+
+
+def test_an_accelerometer_in_g_is_told_with_a_remedy_that_works(tmp_path: Path) -> None:
+    log = with_imu(tmp_path, upright=1.0)
+    found = matched(tmp_path, log, text=AFLOAT)
+    assert (
+        'if that is in g, say so in a setup file (--setup): [[channel]] path = "/imu.linear_acceleration.x"'
+        in told(found)
+    )
+    rows = "".join(f'[[channel]]\npath = "/imu.linear_acceleration.{axis}"\nunit = "g"\n' for axis in "xyz")
+    setup = written(tmp_path, f'format = "chladni.setup/1"\n{rows}', "setup.toml")
+    with chladni.open(log, setup=setup) as opened:
+        found = joint_log(chladni.load_robot(tmp_path / "arm.xml"), opened)
+    np.testing.assert_allclose(found.imu.linear_acceleration[2], 9.80665)
+    assert "in g" not in told(found)
 
 
 def test_of_several_imus_none_is_guessed(tmp_path: Path) -> None:

@@ -184,6 +184,11 @@ def test_what_urdf_lacks_is_told(of_urdf: Machine, tmp_path: Path) -> None:
         assert any(word in one for one in told)
 
 
+def test_an_imu_that_is_turned_is_told(described: Machine, tmp_path: Path) -> None:
+    told = write_robot(replace(described, imu_turned=(0.05, 0.0, -0.02)), tmp_path / "found.xml").not_held
+    assert told == ("the IMU is turned by 0.05, 0, -0.02 rad about its own axes",)
+
+
 def test_files_that_are_there_stay_unless_they_may_go(described: Machine, tmp_path: Path) -> None:
     (tmp_path / "found.xml").write_text("mine")
     with pytest.raises(LogError, match=r"found\.xml"):

@@ -36,8 +36,12 @@ def readings(torques: Torques) -> Iterator[Term]:
 
 def bodies(torques: Torques) -> Iterator[Term]:
     """Tilt, and wrong masses."""
-    angles = tuple(Number(name=name, unit="rad", scale=_TILT) for name in ("about_x", "about_y"))
-    yield Term(word="gravity_tilt", site=WORLD, columns=torques.tilt, numbers=angles)
+    angles = tuple(Number(name=name, unit="rad", scale=_TILT) for name in ("about_x", "about_y", "about_z"))
+    if torques.base is None:
+        yield Term(word="gravity_tilt", site=WORLD, columns=torques.tilt, numbers=angles[:2])
+    elif torques.log.imu is not None:
+        # Which way is down an IMU tells.
+        yield Term(word="misalignment", site=torques.log.imu.site, columns=torques.turned_imu, numbers=angles)
     mass = Number(name="mass", unit="1", scale=_MASS, least=-1.0)
     for name, own, columns in _links(torques):
         if own[0] > 0:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.robots.answer import Answer
 from chladni.gap.robots.solved import solved
+from chladni.gap.robots.support import require_in_the_air
 from chladni.gap.robots.torques import torques_of
 from chladni.robots.joint_log import JointLog
 from chladni.robots.robot import Robot
@@ -15,11 +16,12 @@ StepProgress = Callable[[str, float], None]
 #: Words of robots beside those of effects.md.
 ROBOT_WORDS = (
     "armature", "backlash", "controller_gain", "coulomb_friction", "dead_zone", "delay", "encoder_offset", "gain_error",
-    "gravity_tilt", "hysteresis", "joint_elasticity", "joint_spring", "lag", "load_friction", "one_sided_stop", "payload",
-    "quadratic_damping", "rate_limit", "ripple", "saturation", "stribeck_friction", "viscous_friction",
+    "gravity_tilt", "hysteresis", "joint_elasticity", "joint_spring", "lag", "load_friction", "misalignment",
+    "one_sided_stop", "payload", "quadratic_damping", "rate_limit", "ripple", "saturation", "stribeck_friction",
+    "viscous_friction",
 )  # fmt: skip
-#: Words of docs/robots.md that have no column yet: what they'd name is unknown, and leaving them out changes nothing.
-WITHOUT_COLUMN = ("external_force", "misalignment")
+#: Words of docs/robots.md that have no column: what they'd name is unknown, and leaving them out changes nothing.
+WITHOUT_COLUMN = ("external_force",)
 
 
 @in_one_thread()
@@ -53,6 +55,7 @@ def diagnose_robot(
     tell = progress or (lambda _step, _share: None)
     tell("locating", 0.0)
     torques = torques_of(robot, log)
+    require_in_the_air(torques)
     tell("explaining", 0.2)
     found = solved(torques, leave_out, lambda share: tell("explaining", 0.2 + 0.6 * share))
     tell("measuring the closing", 0.9)

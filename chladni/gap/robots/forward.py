@@ -12,6 +12,7 @@ from chladni.gap.robots.tolerances import INERTIAL_NAMES, LOOP_S, tolerated_iner
 from chladni.gap.robots.torques import ALL_COMMANDS, Torques
 from chladni.gap.robots.transmission_words import AT_MOTOR, LEAST_ROTOR
 from chladni.robots.dynamics import inertial_numbers
+from chladni.robots.floating_base import BaseMotion
 from chladni.robots.machine import (
     Coupling,
     Loop,
@@ -30,6 +31,7 @@ _PERIODS = 16.0
 _ROUNDING = 1e-6
 #: A drive gives at most ten times what it's asked for.
 _LEAST_OVER = 0.1
+_ANGLES = ("gravity_tilt", "misalignment")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -113,13 +115,16 @@ class _Reading:
                 self._joints[term.site] = law(self._joints[term.site], term, values, self._torques)
         for name in self._torques.log.joints:
             self._set_drive(name)
-        tilts = [values for term, values in self._terms if term.word == "gravity_tilt"]
+        found = {term.word: values.tolist() for term, values in self._terms if term.word in _ANGLES}
+        about_x, about_y = found.get("gravity_tilt", (0.0, 0.0))
+        turned_x, turned_y, turned_z = found.get("misalignment", (0.0, 0.0, 0.0))
         return Machine(
             robot=self._robot,
             joints=tuple(self._joints[one.name] for one in self._robot.joints),
             inertial=self._inertial(),
-            tilt=(float(tilts[0][0]), float(tilts[0][1])) if tilts else (0.0, 0.0),
+            tilt=(about_x, about_y),
             couplings=tuple(self._couplings()),
+            imu_turned=(turned_x, turned_y, turned_z),
         )
 
     def _set_within(self, name: str) -> None:
@@ -343,7 +348,7 @@ def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -
     driven = Driven(
         asked=_asked(machine, torques, np.concatenate(at_s)), kind=_kinds(torques), every=every, step_s=step_s,
         position=torques.fast_position[:, starts], velocity=torques.fast_velocity[:, starts],
-        steps=np.array([one.size for one in at_s]),
+        steps=np.array([one.size for one in at_s]), base=_base(machine, torques, np.concatenate(at_s)),
     )  # fmt: skip
     found = np.full_like(log.position, np.nan)
     found[:, np.concatenate(samples)] = run(machine, names, driven)
@@ -353,6 +358,21 @@ def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -
 def _by_effort(torques: Torques) -> bool:
     """Whether runs are driven by efforts: where loops are known they hold the joints near where they were."""
     return torques.by_effort and not (torques.two_sided and bool(np.all(np.isfinite(torques.by_row("kp")))))
+
+
+def _base(machine: Machine, torques: Torques, at_s: Real) -> BaseMotion | None:
+    """How a base that floats moves, as fast as joints are followed."""
+    moved = torques.base_motion(torques.fast_hz, machine.imu_turned)
+    if moved is None:
+        return None
+
+    def at(rows: Real) -> Real:
+        return np.array([np.interp(at_s, torques.log.time_s, row) for row in rows])
+
+    return BaseMotion(
+        force=at(moved.force), angular_velocity=at(moved.angular_velocity),
+        angular_acceleration=at(moved.angular_acceleration),
+    )  # fmt: skip
 
 
 def _kinds(torques: Torques) -> tuple[str, ...]:

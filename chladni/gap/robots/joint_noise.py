@@ -17,11 +17,26 @@ def steps_and_noise(values: Real, sample_rate_hz: float, stretches: Sequence[tup
 
     The density is that of the upper part of the band, and at least that of rounding to the step.
     """
-    a, b = max(stretches, key=lambda one: one[1] - one[0])
     steps = np.array([_step(row) for row in values])
-    lines, density = welch(values[:, a:b], sample_rate_hz, nperseg=min(_LINES, b - a), axis=-1)
-    upper = np.median(density[:, lines > _ABOVE * sample_rate_hz / 2.0], axis=-1)
+    upper = upper_density(values, sample_rate_hz, stretches, sample_rate_hz)
     return steps, np.maximum(upper, steps**2 / 12.0 / (sample_rate_hz / 2.0))
+
+
+def upper_density(
+    values: Real, sample_rate_hz: float, stretches: Sequence[tuple[int, int]], own_rate_hz: float
+) -> Real:
+    """Give the density of ``[row, sample]`` in the upper part of the band, unit^2/Hz.
+
+    Parameters
+    ----------
+    own_rate_hz
+        At which they were sampled before they came to this grid: beyond its band there is nothing.
+    """
+    a, b = max(stretches, key=lambda one: one[1] - one[0])
+    lines, density = welch(values[:, a:b], sample_rate_hz, nperseg=min(_LINES, b - a), axis=-1)
+    band_hz = min(sample_rate_hz, own_rate_hz) / 2.0
+    # The line at the band's end may hold but half of what the others do.
+    return np.asarray(np.median(density[:, (lines > _ABOVE * band_hz) & (lines <= band_hz)], axis=-1))
 
 
 def _step(row: Real) -> float:
@@ -43,3 +58,23 @@ def torque_noise(density: Real, cutoff_hz: float, *, stiffness: Real, damping: R
     own = np.abs(stiffness[:, None] + 1j * omega * damping[:, None] - omega**2 * np.diag(inertia)[:, None]) ** 2
     others = (inertia - np.diag(np.diag(inertia))) ** 2 @ density * float(np.mean(omega**4))
     return np.asarray((density * np.mean(own, axis=1) + others) * cutoff_hz)
+
+
+def imu_noise(force: float, turning: float, cutoff_hz: float, *, carried: Real, place: Real) -> Real:
+    """Give ``[joint]``: variance of the torque that an IMU's noise seems to need below a cutoff.
+
+    Parameters
+    ----------
+    force, turning
+        Densities of the accelerometer, (m/s^2)^2/Hz, and the gyroscope, (rad/s)^2/Hz, of each axis.
+    carried
+        ``[6, joint, sample]`` torque a unit of the base's acceleration, linear, then angular.
+    place
+        ``[3]`` of the IMU on the base, m.
+    """
+    linear = carried[:3]
+    # What turns the sensor moves the base's origin against it.
+    angular = carried[3:] - np.einsum("ka,ajs->kjs", np.cross(np.eye(3), place), linear)
+    of_rate = (2.0 * np.pi) ** 2 * cutoff_hz**3 / 3.0
+    by_force, by_turning = (np.mean(np.sum(one**2, axis=0), axis=-1) for one in (linear, angular))
+    return np.asarray(force * cutoff_hz * by_force + turning * of_rate * by_turning)

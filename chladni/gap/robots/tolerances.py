@@ -10,6 +10,10 @@ from chladni.robots.dynamics import inertial_numbers
 from chladni.robots.robot import Robot
 from chladni.signals.arrays import Real
 
+#: Zero-g offset of an accelerometer, m/s^2, one sigma: sensors of robots are within two or three hundredths of g.
+_ZERO_G = 0.1
+#: The same of its delay, s: low-pass filters of such sensors take 2 to 20 ms by their data sheets.
+_IMU_S = 0.005
 #: Half the period of a loop at 500 Hz, s.
 LOOP_S = 1e-3
 
@@ -31,6 +35,10 @@ def tolerances(torques: Torques) -> tuple[Real, list[str]]:
             both = at_row(torques, torques.servo_row(row), torques.answered[row] + damped, damped)
             both *= doubts[:, None, None]
             found += zip((f"{joint.name}.kp", f"{joint.name}.kd"), both, strict=True)
+    if torques.base is not None:
+        # What an accelerometer reads at rest is off by a constant, and filters of an IMU take their time.
+        found += zip(("imu.x", "imu.y", "imu.z"), _ZERO_G * torques.carried[:3], strict=True)
+        found.append(("imu.late", _IMU_S * torques.late_base))
     if served:
         # A digital servo holds what it reads for a period.
         found.append(("loop", -LOOP_S * torques.at_servos(torques.loop)))

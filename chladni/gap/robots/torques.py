@@ -1,6 +1,6 @@
 """The torque that a robot's description lacks: what its drives gave, less what its motion needed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -10,13 +10,16 @@ from typing import Any, Self
 import numpy as np
 from scipy.ndimage import correlate1d
 from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
-from chladni.gap.robots.joint_noise import steps_and_noise, torque_noise
-from chladni.robots.dynamics import Needed, gravity_columns, motion_torque, needed_torque
+from chladni.gap.robots.joint_noise import imu_noise, steps_and_noise, torque_noise, upper_density
+from chladni.robots.dynamics import Needed, carried_columns, gravity_columns, motion_torque, needed_torque
+from chladni.robots.floating_base import BaseMotion, FloatingBase, at_origin, floating_base, place_on_base
 from chladni.robots.joint_log import JointLog
 from chladni.robots.robot import Robot, RobotJoint
 from chladni.signals.arrays import Index, Mask, Real
-from chladni.signals.errors import LogError, ModelError
+from chladni.signals.errors import LogError
+from chladni.signals.visible import visible
 
 #: Up to which frequency torques are compared, Hz: joints of arms and legs move below it, and differentiated encoder
 #: steps grow with its square (Swevers, Verdonck & De Schutter 2007 take 10 Hz).
@@ -28,7 +31,7 @@ _FAST = 4.0
 #: Periods of the cutoff that both ends of a stretch lose to the filter.
 _ENDS = 3.0
 #: Least periods of the cutoff in a stretch.
-_LEAST = 12.0
+LEAST = 12.0
 #: Of the usual torque: what a rigid description is right to, unless a fit leaves less.
 RIGHT = 0.02
 #: Of its usual speed: within this a joint could move either way, however fine its encoder.
@@ -120,11 +123,11 @@ class Torques:
     def stretches(self) -> tuple[tuple[int, int], ...]:
         """First and last sample of the stretches that are long enough."""
         bounds = [0, *self.log.breaks, self.log.position.shape[1]]
-        least = _LEAST / self.cutoff_hz * self.log.sample_rate_hz
+        least = LEAST / self.cutoff_hz * self.log.sample_rate_hz
         found = tuple((a, b) for a, b in pairwise(bounds) if b - a >= least)
         if not found:
             raise LogError(
-                f"{self.log.log}: no stretch of {_LEAST / self.cutoff_hz:.2g} s without a gap; record a longer one"
+                f"{self.log.log}: no stretch of {LEAST / self.cutoff_hz:.2g} s without a gap; record a longer one"
             )
         return found
 
@@ -209,10 +212,15 @@ class Torques:
             found[..., a:b] = correlate1d(values[..., a:b], _SLOPE, axis=-1, mode="nearest") * self.log.sample_rate_hz
         return found
 
+    @property
+    def fast_hz(self) -> float:
+        """A few cutoffs."""
+        return min(_FAST * self.cutoff_hz, 0.4 * self.log.sample_rate_hz)
+
     @cached_property
     def fast_position(self) -> Real:
         """``[joint, sample]`` of the log's grid, below a few cutoffs."""
-        return self._filtered(self.log.position, min(_FAST * self.cutoff_hz, 0.4 * self.log.sample_rate_hz))
+        return self._filtered(self.log.position, self.fast_hz)
 
     @cached_property
     def fast_velocity(self) -> Real:
@@ -252,25 +260,84 @@ class Torques:
         return found
 
     @cached_property
-    def all_positions(self) -> Real:
-        """``[dof, coarse]`` of the whole robot: joints that the log lacks rest where the description has them."""
-        return self._of_dofs(self.position, np.asarray(self.robot.model.qpos0, dtype=np.float64))
+    def base(self) -> FloatingBase | None:
+        """The base, where it floats."""
+        return floating_base(self.robot)
 
-    def _of_dofs(self, rows: Real, rest: Real) -> Real:
-        found = np.repeat(rest[:, None], rows.shape[1], axis=1)
-        found[[one.dof for one in self.joints]] = rows
-        return found
+    def base_motion(self, cutoff_hz: float, turned: Sequence[float] = (0.0, 0.0, 0.0)) -> BaseMotion | None:
+        """Give the motion of a base that floats, as its IMU tells it below a cutoff.
+
+        Parameters
+        ----------
+        turned
+            By which the IMU is turned from how it's described, a rotation vector in its own axes, rad.
+        """
+        if self.base is None or self.log.imu is None:
+            return None
+        imu = self.log.imu
+        described, place = place_on_base(self.robot, self.base, imu.site)
+        axes = described @ Rotation.from_rotvec(turned).as_matrix()
+        force, turning = (
+            self._filtered(axes @ one, cutoff_hz) for one in (imu.linear_acceleration, imu.angular_velocity)
+        )
+        felt = BaseMotion(force=force, angular_velocity=turning, angular_acceleration=self._rate(turning))
+        return at_origin(place, felt)
+
+    @cached_property
+    def all_positions(self) -> Real:
+        """``[qpos, coarse]`` of the whole robot: joints that the log lacks rest where the description has them."""
+        rest = np.asarray(self.robot.model.qpos0, dtype=np.float64).copy()
+        if self.base is not None:
+            # Everything is told in the axes of the base.
+            rest[self.base.position : self.base.position + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+        return _laid(self.position, [one.position for one in self.joints], rest)
+
+    @cached_property
+    def _rates(self) -> tuple[Real, Real]:
+        """``[dof, coarse]``: velocities and accelerations."""
+        return self._rates_by(np.zeros(3))
+
+    def _rates_by(self, turned: Real) -> tuple[Real, Real]:
+        """Give them for an IMU that is turned."""
+        still, places = np.zeros(self.robot.model.nv), [one.dof for one in self.joints]
+        velocity, acceleration = (_laid(one, places, still) for one in (self.velocity, self.acceleration))
+        motion = self.base_motion(self.cutoff_hz, turned.tolist())
+        if self.base is not None and motion is not None:
+            linear, angular = (slice(a, a + 3) for a in (self.base.dof, self.base.dof + 3))
+            velocity[angular] = motion.angular_velocity[:, self.kept]
+            gravity = np.array(self.robot.model.opt.gravity)
+            acceleration[linear] = motion.force[:, self.kept] + gravity[:, None]
+            acceleration[angular] = motion.angular_acceleration[:, self.kept]
+        return velocity, acceleration
 
     @cached_property
     def need(self) -> Needed:
         """What the motion needs, of every degree of freedom."""
-        still = np.zeros(self.robot.model.nv)
-        return needed_torque(
-            self.robot,
-            self.all_positions,
-            self._of_dofs(self.velocity, still),
-            self._of_dofs(self.acceleration, still),
-        )
+        return needed_torque(self.robot, self.all_positions, *self._rates)
+
+    @cached_property
+    def carried(self) -> Real:
+        """``[6, joint, coarse]``: torque a unit of the acceleration of a base that floats, linear, then angular."""
+        if self.base is None:
+            return np.zeros((0, *self.position.shape))
+        return self.of_joints(carried_columns(self.robot, self.base, self.all_positions))
+
+    @cached_property
+    def late_base(self) -> Real:
+        """``[joint, coarse]``: missing torque a second that the IMU of a base that floats comes late."""
+        motion = self.base_motion(self.cutoff_hz)
+        if motion is None:
+            return np.zeros_like(self.position)
+        rate = self._rate(np.concatenate([motion.force, motion.angular_acceleration]))
+        return np.asarray(np.einsum("ajk,ak->jk", self.carried, rate[:, self.kept]))
+
+    @cached_property
+    def held(self) -> Real | None:
+        """``[6, coarse]``: force and moment at a base that floats that its motion needs, in its own axes, N and N m.
+
+        Zero in free flight.
+        """
+        return None if self.base is None else self.need.torque[self.base.dof : self.base.dof + 6]
 
     def of_joints(self, dofs: Real) -> Real:
         """Rows of the log's joints among ``[..., dof, coarse]``."""
@@ -292,16 +359,21 @@ class Torques:
 
     def turned(self, row: int, position: Real, velocity: Real, acceleration: Real, step: float | None = None) -> Real:
         """``[joint, coarse]``: needed torque a unit by which a joint is elsewhere than it reads, by so many units."""
-        step, still = step or _TURN / rms(position), np.zeros(self.robot.model.nv)
-        dof = self.joints[row].dof
-        moved = (
-            self.all_positions.copy(),
-            self._of_dofs(self.velocity, still),
-            self._of_dofs(self.acceleration, still),
-        )
-        for whole, part in zip(moved, (position, velocity, acceleration), strict=True):
-            whole[dof] += step * part
+        step = step or _TURN / rms(position)
+        one = self.joints[row]
+        moved = self.all_positions.copy(), *(each.copy() for each in self._rates)
+        for whole, part, place in zip(
+            moved, (position, velocity, acceleration), (one.position, one.dof, one.dof), strict=True
+        ):
+            whole[place] += step * part
         return (self.of_joints(motion_torque(self.robot, *moved)) - self.of_joints(self.need.torque)) / step
+
+    @cached_property
+    def turned_imu(self) -> Real:
+        """``[3, joint, coarse]``: torque a radian that the IMU of a base that floats is turned by about its axes."""
+        step, needed = 1e-3, self.need.torque
+        moved = (needed_torque(self.robot, self.all_positions, *self._rates_by(step * one)) for one in np.eye(3))
+        return self.of_joints(np.array([(one.torque - needed) / step for one in moved]))
 
     def command(self, later_s: float = 0.0) -> Real:
         """``[joint, sample]`` of the log's grid: the command as it arrives, and later still; NaN without any.
@@ -551,8 +623,7 @@ class Torques:
     @cached_property
     def noise_of_speed(self) -> Real:
         """``[joint]``: standard deviation of the fast velocity's noise."""
-        fast = min(_FAST * self.cutoff_hz, 0.4 * self.log.sample_rate_hz)
-        noise = np.sqrt(self._steps[1] * (2.0 * np.pi) ** 2 * fast**3 / 3.0)
+        noise = np.sqrt(self._steps[1] * (2.0 * np.pi) ** 2 * self.fast_hz**3 / 3.0)
         usual = np.std(self.fast_velocity, axis=1)
         return np.asarray(np.maximum(noise, _STILL * usual) + 1e-12)
 
@@ -565,6 +636,7 @@ class Torques:
         by_position = not self.by_effort and self.log.command_kind == "position"
         kp, kd = (one * by_position for one in (self.kp, self.kd))
         found = torque_noise(self._steps[1], self.cutoff_hz, stiffness=kp, damping=kd + damping, inertia=inertia)
+        found = found + self._noise_of_base
         if not self.by_effort:
             return np.sqrt(found)
         rate, stretches = self.log.sample_rate_hz, self.stretches
@@ -575,6 +647,18 @@ class Torques:
         differs = self.kp[:, None] * (self._held(0.0) - self.log.position) - self.kd[:, None] * self.loop_velocity
         loops = steps_and_noise(np.nan_to_num(differs) - self.fast_drive, rate, stretches)[1] * self.cutoff_hz
         return np.asarray(np.sqrt(np.concatenate([found + np.minimum(effort, loops), loops])))
+
+    @property
+    def _noise_of_base(self) -> Real | float:
+        """``[joint]``: variance that the noise of the IMU gives the missing torque."""
+        if self.base is None or self.log.imu is None:
+            return 0.0
+        imu, place = self.log.imu, place_on_base(self.robot, self.base, self.log.imu.site)[1]
+        force, turning = (
+            float(np.mean(upper_density(one, self.log.sample_rate_hz, self.stretches, imu.sample_rate_hz)))
+            for one in (imu.linear_acceleration, imu.angular_velocity)
+        )
+        return imu_noise(force, turning, self.cutoff_hz, carried=self.carried, place=place)
 
     @cached_property
     def highest_noise(self) -> Real:
@@ -673,6 +757,13 @@ def rms(values: Real) -> float:
     return float(np.sqrt(np.mean(values**2))) + 1e-12
 
 
+def _laid(rows: Real, places: list[int], rest: Real) -> Real:
+    """Give rows at their places among those that rest."""
+    found = np.repeat(rest[:, None], rows.shape[1], axis=1)
+    found[places] = rows
+    return found
+
+
 def _integral(at: Real, starts: Real, values: Real, sums: Real) -> Real:
     """Of a held signal from the first start to some times; before it the first value holds."""
     place = np.maximum(np.searchsorted(starts, at, "right") - 1, 0)
@@ -681,11 +772,15 @@ def _integral(at: Real, starts: Real, values: Real, sums: Real) -> Real:
 
 def torques_of(robot: Robot, log: JointLog) -> Torques:
     """Give the torques of a log."""
-    cutoff = min(CUTOFF_HZ, _MOST * log.sample_rate_hz)
-    if robot.base == "floating":
-        raise ModelError(
-            f"{robot.name}: its base floats, and inverse dynamics needs its pose; fix it in the description (leave "
-            "out its free joint) and hang the robot up to diagnose its joints"
+    # What is slower of two tells up to where both do.
+    imu_hz = np.inf if robot.base == "fixed" or log.imu is None else log.imu.sample_rate_hz
+    cutoff = min(CUTOFF_HZ, _MOST * min(log.sample_rate_hz, imu_hz))
+    found = Torques(robot=robot, log=log, cutoff_hz=cutoff)
+    if found.base is not None and log.imu is None:
+        raise LogError(
+            f"{log.log}: {robot.name}'s base floats, and no IMU tells how it moves; record one (sensor_msgs/Imu) on "
+            f"{visible(found.base.link)} and name it as imu in [log] of a robot file, or hold the base still and say "
+            'base = "fixed" there'
         )
     found = Torques(robot=robot, log=log, cutoff_hz=cutoff)
     if log.command is None and not found.by_effort:

@@ -15,6 +15,7 @@ pytest.importorskip("scipy")
 from chladni_withheld.campaign import make_cases  # noqa: E402 - behind what may be missing
 from chladni_withheld.folders import case_folders, truth_of_case  # noqa: E402
 from chladni_withheld.marking import mark  # noqa: E402
+from chladni_withheld.robots.afloat import let_float  # noqa: E402
 from chladni_withheld.robots.cause import Stage  # noqa: E402
 from chladni_withheld.robots.causes import OUTSIDE_CAUSES  # noqa: E402
 from chladni_withheld.robots.descriptions import SOURCES, describe  # noqa: E402
@@ -24,11 +25,11 @@ from chladni_withheld.score import scored  # noqa: E402
 from chladni_withheld.vocabulary import FAMILY_OF, OUTSIDE  # noqa: E402
 
 
-def staged(seed):
+def staged(seed, *, floats=False):
     """A short log of a robot with nothing hidden, densely sampled and with a perfect encoder."""
     for rng in np.random.default_rng(seed).spawn(20):
         try:
-            scene = draw_scene(rng)
+            scene = draw_scene(rng, floats=floats)
             recorder = replace(scene.recorder, state_hz=1000.0, state_s=0.0, length_s=6.0, resolution=0.0)
             scene = replace(scene, recorder=recorder)
             return rng, Stage(scene=scene, quiet=scene.motion())
@@ -67,6 +68,63 @@ def test_work_of_the_motors_is_the_energy_of_the_links():
     stored = energy(model, motion)
     assert np.ptp(stored) > 0
     assert_allclose(work, stored - stored[0], atol=0.02 * np.ptp(stored))
+
+
+def test_a_base_that_floats_obeys_mechanics_and_its_imu_feels_it():
+    _, stage = staged(21, floats=True)
+    motion, machine = stage.quiet, stage.scene.machine
+    base, sensor = machine.base, machine.base.sensor
+    pose, twist, push = motion.base[:7], motion.base[7:13], motion.base[13:]
+    model = let_float(machine.model)
+    data = model.createData()
+    q, v, a = (np.vstack(both).T for both in
+               ((pose, motion.link), (twist, motion.link_speed), (push, motion.acceleration)))  # fmt: skip
+    needed = np.array([pin.rnea(model, data, *each) for each in zip(q, v, a, strict=True)]).T
+    held = np.array([base.force(t, pin.XYZQUATToSE3(place), speed)
+                     for t, place, speed in zip(motion.t_s, pose.T, twist.T, strict=True)]).T  # fmt: skip
+    # A step of the integration lies between what pulls and where it's told.
+    assert_allclose(needed[6:], motion.given, atol=0.02 * motion.given.std())
+    assert_allclose(needed[:6], held, atol=0.02 * np.abs(needed[:6]).max())
+    # The IMU's place, differentiated twice in the world.
+    poses = [pin.XYZQUATToSE3(place) * sensor.pose for place in pose.T]
+    point = np.array([one.translation for one in poses])
+    step = motion.t_s[1] - motion.t_s[0]
+    force = np.gradient(np.gradient(point, step, axis=0), step, axis=0) - machine.model.gravity.linear
+    own = np.array([one.rotation.T @ each for one, each in zip(poses, force, strict=True)])
+    stamps, felt = motion.imu[0] - 0.5 / sensor.rate_hz, motion.imu[4:]
+    inside = (stamps > motion.t_s[5]) & (stamps < motion.t_s[-5])
+    between = np.array([np.interp(stamps[inside], motion.t_s, row) for row in own.T])
+    assert np.sqrt(np.mean((felt[:, inside] - between) ** 2)) < 0.03 * np.sqrt(np.mean(felt**2))
+
+
+def test_an_afloat_case_has_its_imu_in_its_files():
+    case = draw_case(5, 1, "afloat")
+    assert 'base = "floating"' in case.model
+    assert 'imu = { topic = "/imu", site = "trunk_imu" }' in case.model
+    assert '<link name="trunk_imu"' in case.beside["robot.urdf"]
+    assert case.topics[0].channels[0].name == "/imu.angular_velocity.x"
+    assert len(case.effects) == 1
+    assert case.effects[0].severity_tuned > 3.0
+
+
+def test_a_robot_afloat_that_is_right_is_a_whole_truth(tmp_path):
+    assert make_cases(tmp_path, count=1, seed=2, generator="robots", kinds=["afloat_none=1"]) == 1
+    (case,) = case_folders(tmp_path)
+    assert truth_of_case(tmp_path, case)["effects"] == []
+
+
+def test_what_is_told_of_bases_that_float_is_scored():
+    truth = {"kind": "afloat", "ratio": 9.0,
+             "effects": [{"effect": "delay", "site": "knee", "parameters": {"delay": 0.01}}]}  # fmt: skip
+    right, wrong = (answer(("delay", site, {"delay": {"value": 0.01}})) for site in ("knee", "hip"))
+    none = {"kind": "afloat_none", "effects": []}
+    quiet = answer(verdict="none")
+    score = scored([mark("a", truth, right), mark("b", truth, wrong), mark("c", none, quiet), mark("d", none, wrong)])
+    robots = score["robots"]
+    assert (robots["afloat_site"]["right"], robots["afloat_site"]["count"]) == (1, 2)
+    assert (robots["afloat_wrong"]["right"], robots["afloat_wrong"]["count"]) == (2, 4)
+    assert mark("c", none, quiet).whole_is_right
+    assert not mark("d", none, wrong).whole_is_right
 
 
 def test_friction_takes_energy_and_never_gives_any():
