@@ -48,7 +48,7 @@ def test_rubber_is_no_mass_on_a_mount(out: frozenset[str]) -> None:
     assert found.verdict == "unknown"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_joint_that_relaxes_a_little_passes_for_no_wrong_value() -> None:
     out = frozenset(CATALOGUE)
     relaxing = diagnose(arm(), [measured((Rubber(stiffness=2e3),), seed=5, seconds=5.0)], leave_out=out)
