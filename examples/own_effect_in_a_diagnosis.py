@@ -12,6 +12,7 @@ import chladni
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
+from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
 from chladni.models.excitations.multisine import Multisine
 from chladni.models.instruments.robot_arm import arm_model
@@ -19,6 +20,8 @@ from chladni.viewers.gap_summary import summary
 
 SECONDS, RATE_HZ, NOISE = 6.0, 1000.0, 0.01
 COEFFICIENT = 200.0
+#: Words of the catalogue that are weighed beside it; without `leave_out` all are, which takes a minute.
+WEIGHED = {"coulomb_friction", "quadratic_damping", "hardening_stiffness", "saturation", "gain_error"}
 
 
 def cubic_drag(_d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -68,8 +71,8 @@ def log_of_the_machine() -> chladni.TimeSeries:
 def main() -> None:
     """Diagnose with and without the effect of one's own."""
     log = log_of_the_machine()
-    for title, own in (("catalogue alone", ()), ("with cubic_drag", (CUBIC_DRAG,))):
-        found = chladni.diagnose_gap(arm_model(), log, own_effects=own)
+    for title, own in (("without it", ()), ("with cubic_drag", (CUBIC_DRAG,))):
+        found = chladni.diagnose_gap(arm_model(), log, own_effects=own, leave_out=CATALOGUE.keys() - WEIGHED)
         print(f"{title}: {found.verdict}")
         for sentence in summary(found):
             print(f"  {sentence}")

@@ -11,7 +11,9 @@ from hypothesis import settings
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # How long an example takes depends on what else the machine does; speed is measured in benchmarks/.
-settings.register_profile("chladni", deadline=None)
+# Few inputs of each property in the gate; beside the nightly tests, `--hypothesis-profile=many`.
+settings.register_profile("chladni", deadline=None, max_examples=25)
+settings.register_profile("many", deadline=None)
 settings.load_profile("chladni")
 
 

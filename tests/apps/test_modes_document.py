@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 
 from chladni.apps.modes_document import modes_document
 from chladni.modal.shapes.relative_motion import relative_motion
@@ -83,7 +83,6 @@ def test_unknown_numbers_are_null() -> None:
     assert mode["relative_motion"][0]["ratio_std"] is None
 
 
-@settings(max_examples=40)
 @given(ours.mode_sets(), ours.geometries())
 def test_any_modes_give_strict_json(modes, geometry) -> None:  # type: ignore[no-untyped-def]
     document = modes_document(modes, validate(modes), relative_motion(modes, geometry))

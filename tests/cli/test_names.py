@@ -119,6 +119,7 @@ def written(pair: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("pair", [write_log, pytest.param(write_table, marks=pytest.mark.nightly)], indirect=True)
 def test_every_command_prints_and_writes_harmless_names(
     run: Run, pair: tuple[Path, Path], written: tuple[Path, Path]
 ) -> None:

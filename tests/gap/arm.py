@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import chladni
 from chladni.gap.records.measurement import Measurement
@@ -25,6 +26,12 @@ ONE_OF_EACH_KIND = frozenset({"coulomb_friction", "hardening_stiffness", "satura
 def all_but(*words: str) -> frozenset[str]:
     """Words of the catalogue to leave out, so that these and one of each kind take part."""
     return frozenset(CATALOGUE) - ONE_OF_EACH_KIND - set(words)
+
+
+def among_few(*words: str) -> pytest.MarkDecorator:
+    """Run a test among these words and one of each kind, and by hand among the whole catalogue: `out` is left out."""
+    whole = pytest.param(frozenset(), id="catalogue", marks=pytest.mark.nightly)
+    return pytest.mark.parametrize("out", [pytest.param(all_but(*words), id="few"), whole])
 
 
 def arm() -> StructureModel:

@@ -118,7 +118,7 @@ def samples(path: Path) -> tuple[dict[str, Real], int]:
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2))])
 def test_a_damaged_message_costs_only_itself(tmp_path: Path, encoding: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     values = np.float32(rng.normal(size=(MESSAGES, 9))).astype(np.float64)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.grid_buffer import GridBuffer
@@ -23,7 +23,6 @@ runs = st.tuples(st.integers(0, FIRST + COUNT + 10), st.integers(0, 40)).map(lam
 puts = st.lists(st.tuples(st.permutations(range(3)), st.integers(1, 3), runs | places), max_size=6)
 
 
-@settings(max_examples=200)
 @given(puts=puts)
 def test_what_nothing_was_laid_on_is_missing(puts: list[tuple[list[int], int, list[int]]]) -> None:
     """Against the plain way: everything NaN first, then one sample after another."""

@@ -105,7 +105,7 @@ def test_the_narrowest_topics_are_listed_and_the_others_told(
         max_size=30,
     )
 )
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 def test_json_messages_that_hold_few_of_their_fields(tmp_path: Path, contents: list[dict[str, Any]]) -> None:
     schema = {"type": "object", "properties": {f"f{field}": {"type": "number"} for field in range(40)}}
     with LogMaker(tmp_path / "a.mcap") as maker:

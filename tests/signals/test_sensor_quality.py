@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
@@ -118,7 +118,6 @@ def test_what_is_sound_is_left_alone(name: str) -> None:
     assert faults_of(SOUND[name]) == ()
 
 
-@settings(deadline=None, max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), step=st.sampled_from([0.0, 1e-3, 0.1]), pole=st.floats(0.0, 0.99))
 def test_no_false_alarm_on_any_noise(seed: int, step: float, pole: float) -> None:
     coloured = lfilter([1.0], [1.0, -pole], noise(seed, 20_000))

@@ -3,7 +3,7 @@
 from collections import Counter
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.unit_labels import LABELS, UnitLabel, verdict
@@ -118,7 +118,6 @@ def test_a_slip_is_mended_only_where_the_quantity_confirms_it() -> None:
                 read_label(slip, quantity=quantity)
 
 
-@settings(deadline=None)
 @given(user_units)
 def test_labels_that_are_units_mean_what_they_say(unit: str) -> None:
     factor, text = si_factor(unit)
@@ -126,7 +125,6 @@ def test_labels_that_are_units_mean_what_they_say(unit: str) -> None:
     assert read_label(unit, quantity=text) == (factor, text)
 
 
-@settings(deadline=None)
 @given(st.text(max_size=40), st.none() | si_units)
 def test_any_text_is_a_unit_or_a_setup_error(text: str, quantity: str | None) -> None:
     try:

@@ -1,7 +1,7 @@
 """Algebra on the text of units."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.signals.errors import SetupError
@@ -81,7 +81,6 @@ def test_canonical_text(text: str, canonical: str) -> None:
     assert written(text) == canonical
 
 
-@settings(deadline=None)
 @given(st.lists(factors, max_size=5))
 def test_canonical_text_is_a_fixed_point_with_the_same_physics(parts: list[tuple[str, int]]) -> None:
     once = written(text_of(parts))
@@ -92,7 +91,6 @@ def test_canonical_text_is_a_fixed_point_with_the_same_physics(parts: list[tuple
     assert exponents_of(once) == {symbol: power for symbol, power in expected.items() if power}
 
 
-@settings(deadline=None)
 @given(st.lists(factors, max_size=4), st.lists(factors, max_size=4))
 def test_a_quotient_undoes_a_product(left: list[tuple[str, int]], right: list[tuple[str, int]]) -> None:
     a, b = (read(text_of(parts), symbol_as_written) for parts in (left, right))
@@ -136,7 +134,6 @@ def test_text_that_is_no_unit_is_refused_in_one_line(text: str, word: str) -> No
     assert "\n" not in str(caught.value)
 
 
-@settings(deadline=None)
 @given(st.text(max_size=120))
 def test_any_text_is_read_or_refused(text: str) -> None:
     try:

@@ -5,7 +5,7 @@ import sys
 
 import pint
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.signals.errors import SetupError
@@ -128,7 +128,6 @@ def test_si_factor(unit: str, factor: float, si_unit: str) -> None:
     assert found == pytest.approx(factor, rel=4e-16 * 4)  # a few roundings
 
 
-@settings(deadline=None)
 @given(user_units)
 def test_canonical_units_are_their_own(unit: str) -> None:
     _, text = si_factor(unit)
@@ -156,7 +155,6 @@ def test_factor_and_dimension_agree_with_stock_pint(unit: str, oracle: pint.Unit
     assert ours.magnitude == pytest.approx(stock.magnitude, rel=1e-9)  # pint's psi has ten digits
 
 
-@settings(deadline=None)
 @given(a=si_units, b=si_units)
 def test_quotient_undoes_product(a: str, b: str) -> None:
     back = quotient(product(a, b), b)
@@ -167,7 +165,6 @@ def test_quotient_undoes_product(a: str, b: str) -> None:
     assert quotient(a, a) == "1"
 
 
-@settings(deadline=None)
 @given(unit=user_units, number=st.floats(-1e9, 1e9, allow_subnormal=False))
 def test_a_quantity_is_its_number_times_the_factor(unit: str, number: float) -> None:
     factor, text = si_factor(unit)
@@ -250,7 +247,6 @@ def test_an_unknown_unit_is_named_with_near_matches(unit: str, words: tuple[str,
     assert "\n" not in str(caught.value)
 
 
-@settings(deadline=None)
 @given(st.text(max_size=40))
 def test_any_text_is_a_unit_or_a_setup_error(text: str) -> None:
     try:

@@ -58,7 +58,6 @@ def by_pickle(value: Value) -> Value:
     return restored
 
 
-@settings(deadline=None, max_examples=60)
 @given(values)
 def test_arrays_cant_be_written_to(value: Value) -> None:
     for array in arrays_of(value).values():
@@ -67,7 +66,6 @@ def test_arrays_cant_be_written_to(value: Value) -> None:
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, by_pickle])
-@settings(deadline=None, max_examples=30)
 @given(value=values)
 def test_a_copy_is_equal_and_read_only_too(copied: Callable[[Value], Value], value: Value) -> None:
     again = copied(value)
@@ -86,7 +84,6 @@ def test_a_deep_copy_shares_no_memory() -> None:
     assert deep.values.max() == 0.0
 
 
-@settings(deadline=None, max_examples=30)
 @given(values)
 def test_bare_numpy_is_refused(value: Value) -> None:
     name = type(value).__name__
@@ -97,7 +94,6 @@ def test_bare_numpy_is_refused(value: Value) -> None:
             operation()
 
 
-@settings(deadline=None, max_examples=30)
 @given(values)
 def test_fields_are_frozen_and_closed(value: Value) -> None:
     with pytest.raises(FrozenInstanceError):
@@ -241,7 +237,6 @@ def test_series_with_channels() -> None:
     assert renamed.channels[0] == Channel(name="x", unit="N")
 
 
-@settings(deadline=None, max_examples=30)
 @given(ours.time_series(gaps=True))
 def test_a_drawn_series_keeps_its_rules(one: TimeSeries) -> None:
     assert one.values.shape == (len(one.channels), one.samples)
@@ -249,7 +244,6 @@ def test_a_drawn_series_keeps_its_rules(one: TimeSeries) -> None:
         assert np.isnan(one.values[~one.valid]).all()
 
 
-@settings(deadline=None, max_examples=30)
 @given(ours.cross_spectra())
 def test_drawn_spectra_are_hermitian_and_positive(spectra: CrossSpectra) -> None:
     matrices = np.moveaxis(spectra.density, -1, 0)

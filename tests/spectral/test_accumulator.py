@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import csd
 
@@ -41,7 +41,6 @@ def with_gaps(whole, *gaps):
     return replace(whole, values=values, valid=valid)
 
 
-@settings(max_examples=30, deadline=None)
 @given(
     lengths=st.lists(st.integers(1, 120), max_size=12),
     hop=st.integers(1, 16),
@@ -60,7 +59,6 @@ def test_any_cut_into_blocks_gives_the_whole_to_the_last_bit(lengths, hop, toget
     assert cut.provenance == whole.provenance
 
 
-@settings(max_examples=40, deadline=None)
 @given(segments=st.integers(1, 48), options=st.sampled_from(AVERAGINGS))
 def test_merged_parts_that_hold_their_last_segment_are_the_whole(segments, options):
     # 49 segments in all; the first part ends with its last segment, the second starts with the next one.

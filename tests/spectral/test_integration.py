@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.signals.channel import Channel
@@ -61,7 +61,6 @@ def test_a_chirp_is_differentiated_to_its_closed_form(times):
     np.testing.assert_allclose(result.series.values[0], truth, atol=1e-5 * np.abs(truth).max())
 
 
-@settings(max_examples=30, deadline=None)
 @given(frequency_hz=st.floats(1.0, 90.0), phase=st.floats(0, 6.28), times=st.sampled_from([1, 2]))
 def test_a_sine_is_right_away_from_the_ends(frequency_hz, phase, times):
     low_hz, omega = 1.0, 2 * np.pi * frequency_hz
@@ -73,7 +72,6 @@ def test_a_sine_is_right_away_from_the_ends(frequency_hz, phase, times):
     assert np.abs(error[inner(result)]).max() < bound
 
 
-@settings(max_examples=30, deadline=None)
 @given(frequency_hz=st.floats(0.0, 80.0), phase=st.floats(0, 6.28))
 def test_the_derivative_of_a_sine_is_right_away_from_the_ends(frequency_hz, phase):
     omega = 2 * np.pi * frequency_hz

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun as rr
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.signals.channel import Channel
@@ -249,7 +249,6 @@ def test_names_that_try_to_break_paths_come_back_whole(tmp_path: Path) -> None:
         assert channel_entity(folder("waveforms", "1", f"Acceleration {1 + place // 4}/2"), channel) in found
 
 
-@settings(max_examples=200)
 @given(names=st.sets(st.text(min_size=1), min_size=2, max_size=2))
 def test_no_two_channels_share_a_path(names: set[str]) -> None:
     paths = {channel_entity("/waveforms", Channel(name=name)) for name in names}

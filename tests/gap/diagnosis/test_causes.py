@@ -29,9 +29,8 @@ def machine():
     return replace(chain([2.0, 1.5], [5e4, 6e4], [12.0, 9.0]), outputs=seen)
 
 
-@pytest.mark.parametrize(
-    "kept", [pytest.param({"ripple"}, marks=pytest.mark.nightly), pytest.param(set(), marks=pytest.mark.slow)]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("kept", [{"ripple"}, set()])
 def test_teeth_that_catch_are_named_over_windows_and_not_without_their_word(kept) -> None:
     toothed = machine().with_effects((attached("ripple", "j0", TEETH),))
     log, _ = measured(toothed, band_noise(3000, rms=60.0), noise=5e-3)

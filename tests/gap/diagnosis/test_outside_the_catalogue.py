@@ -10,7 +10,7 @@ import chladni
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.effects.catalogue import CATALOGUE
-from tests.gap.arm import arm, measured
+from tests.gap.arm import among_few, arm, measured
 from tests.gap.rubber import Rubber
 
 COEFFICIENT = 70.0
@@ -42,12 +42,13 @@ def test_a_wheel_that_spins_between_two_bodies_is_unknown() -> None:
 
 
 @pytest.mark.slow
-def test_rubber_is_no_mass_on_a_mount() -> None:
-    found = diagnose(arm(), [measured((Rubber(),), seed=3)])
+@among_few("added_mass", "extra_mode", "mounting_resonance", "hysteresis")
+def test_rubber_is_no_mass_on_a_mount(out: frozenset[str]) -> None:
+    found = diagnose(arm(), [measured((Rubber(),), seed=3)], leave_out=out)
     assert found.verdict == "unknown"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_joint_that_relaxes_a_little_passes_for_no_wrong_value() -> None:
     out = frozenset(CATALOGUE)
     relaxing = diagnose(arm(), [measured((Rubber(stiffness=2e3),), seed=5, seconds=5.0)], leave_out=out)

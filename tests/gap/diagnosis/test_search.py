@@ -87,7 +87,7 @@ def test_details_of_a_first_effect_dont_cost_the_second_its_name() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("gain", [1.015, 1.4])
+@pytest.mark.parametrize("gain", [1.015, pytest.param(1.4, marks=pytest.mark.nightly)])
 def test_a_second_cause_is_named_where_it_is_a_share_of_the_gap_that_a_model_is_not_rounded_by(gain: float) -> None:
     machine = chain([2.0, 2.5], [2.6e4, 1.7e4], [5.0, 4.0])
     spring = chladni.attached("hardening_stiffness", "j0", {"cubic": 3e9})

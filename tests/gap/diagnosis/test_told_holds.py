@@ -77,7 +77,7 @@ def told(nominal, log, tunables):
     return found.compile().inputs[0].hold
 
 
-@pytest.mark.parametrize("noise", [0.003, 0.01])
+@pytest.mark.parametrize("noise", [pytest.param(0.003, marks=pytest.mark.nightly), 0.01])
 @pytest.mark.parametrize("kind", EXCITATIONS)
 @pytest.mark.parametrize("hold", HOLDS)
 def test_the_hold_of_a_machine_with_nothing_missing(hold, kind, noise):
@@ -99,8 +99,8 @@ def test_twenty_machines_of_each_kind(hold, kind, noise):
     assert [one or DEFAULT for one in answers].count(hold) >= 19
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("hold", HOLDS)
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2))])
+@pytest.mark.parametrize("hold", ["zoh", *(pytest.param(hold, marks=pytest.mark.nightly) for hold in HOLDS[1:])])
 @pytest.mark.parametrize(
     "effect",
     [

@@ -38,7 +38,7 @@ def test_alone_it_is_named() -> None:
     assert found.tuned_parameters["j0.damping"].value == pytest.approx(DAMPING, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_slip_of_a_factor_of_ten_is_named_and_no_effect_is() -> None:
     right = three_bodies()
     model = right.with_values({"j1.stiffness": 10.0 * right.parameters["j1.stiffness"].value})

@@ -47,7 +47,7 @@ def test_a_heavy_load_is_found_where_the_screen_loses_it(
     assert best.effects[0].values["mass"] == pytest.approx(values["mass"], rel=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_and_named() -> None:
     found = diagnose(arm(), [loaded(*LOADS[0])], leave_out=all_but("added_mass", "extra_mode"))
     assert found.verdict == "effect"

@@ -30,10 +30,10 @@ def found_wrong(tunables, z) -> dict[str, float]:
     ("name", "factor"),
     [
         ("j1.stiffness", 10.0),
-        ("j1.stiffness", 0.1),
-        pytest.param("j0.stiffness", 3.0, marks=pytest.mark.slow),
+        pytest.param("j1.stiffness", 0.1, marks=pytest.mark.nightly),
+        pytest.param("j0.stiffness", 3.0, marks=pytest.mark.nightly),
         pytest.param("j2.damping", 10.0, marks=pytest.mark.slow),
-        ("b1.mass", 10.0),
+        pytest.param("b1.mass", 10.0, marks=pytest.mark.nightly),
     ],
 )
 def test_a_slip_of_a_factor_of_ten_is_found_with_its_right_value(name: str, factor: float) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from chladni.io.clock.clock_fit import HELD_UP, JITTERS, grid_agrees
@@ -41,7 +41,6 @@ def allowed_ns(base: TimeBase) -> float:
     return 1e9 * (base.burst_size / base.rate_hz + JITTERS * base.jitter_s + base.wander_s)
 
 
-@settings(deadline=None, max_examples=250)
 @given(
     kind=st.sampled_from(KINDS),
     samples=st.integers(20, 3000),

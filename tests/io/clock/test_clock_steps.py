@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.clock.stamp_order import MAX_CANDIDATES, ClockSteps, arrival_order, find_clock_steps, untangle
@@ -121,7 +121,6 @@ def test_a_clock_that_is_set_back_and_ahead_again_is_not_late() -> None:
     assert base.gap_count == 1
 
 
-@settings(deadline=None, max_examples=60)
 @given(
     lengths=st.lists(st.integers(8, 80), min_size=2, max_size=20),
     rate_hz=st.floats(0.5, 5000.0),

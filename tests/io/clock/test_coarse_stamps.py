@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.clock.coarse_stamps import count_ticks, phase_period, stamp_quantum
@@ -239,7 +239,6 @@ def test_scattered_intervals_have_no_quantum() -> None:
     assert stamp_quantum(np.array([10, 11, 10, 9]) * 1_000_000, 1e7) == 0.0
 
 
-@settings(deadline=None, max_examples=60)
 @given(
     per_tick=st.floats(0.35, 7.0),
     tick_s=st.sampled_from([0.001, 0.01, 1 / 64, 0.1]),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.clock.grid_index import NOWHERE
@@ -37,7 +37,6 @@ def where_it_claims(kind: str, true: Whole, place: int, share: float) -> int:
 
 
 KINDS = ["inside", "near", "a neighbour's", "another's", "before", "after"]
-FEW = settings(max_examples=200, deadline=None)
 one_wrong = given(
     samples=st.integers(12, 200) | st.integers(1200, 3000),
     jitter=st.sampled_from([0.0, 0.01, 0.05, 0.1]),
@@ -65,7 +64,6 @@ def require_places(values: Real, first: int, wrong: int, samples: int, told: int
     assert np.count_nonzero(there) + told >= samples
 
 
-@FEW
 @one_wrong
 def test_one_wrong_stamp_moves_no_other_sample(
     samples: int, jitter: float, seed: int, kind: str, at: float, share: float
@@ -80,7 +78,6 @@ def test_one_wrong_stamp_moves_no_other_sample(
     np.testing.assert_array_equal(np.delete(index - index[0], wrong), np.delete(np.arange(samples), wrong))
 
 
-@FEW
 @one_wrong
 def test_blocks_of_a_log_with_a_wrong_stamp_are_those_of_the_whole(
     samples: int, jitter: float, seed: int, kind: str, at: float, share: float

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.clock.clock_verdict import round_rate
@@ -324,7 +324,6 @@ def test_few_samples_at_any_spacing_raise_nothing(samples: int) -> None:
         assert np.isfinite(base.rate_hz)
 
 
-@settings(deadline=None, max_examples=60)
 @given(st.lists(st.integers(0, 2**62 - 1), max_size=60))
 def test_any_stamps_give_a_verdict(numbers: list[int]) -> None:
     base = fit_time_base(np.array(numbers, dtype=np.int64))
@@ -334,7 +333,6 @@ def test_any_stamps_give_a_verdict(numbers: list[int]) -> None:
     assert base.advice
 
 
-@settings(deadline=None, max_examples=40)
 @given(
     rate_hz=st.floats(0.2, 60_000.0),
     samples=st.integers(20, 3000),

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.clock.time_base import TimeBase, fit_batch_time_base, fit_time_base
@@ -333,7 +333,6 @@ def test_a_gap_of_days_is_not_filled() -> None:
         place(when, rows(np.arange(2000)), fit_time_base(when), CHANNELS)
 
 
-@settings(deadline=None, max_examples=40)
 @given(
     rate_hz=st.floats(0.5, 50_000.0),
     kept=st.lists(st.booleans(), min_size=30, max_size=400),

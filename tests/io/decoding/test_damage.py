@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.decoding import make_decoder
@@ -91,7 +91,6 @@ PATHS = ["header.stamp", "header.frame_id", "name", "position", "velocity", "eff
     gaps=st.sampled_from([(0,), (3, 8)]),
     joints=st.integers(0, 3),
 )
-@settings(max_examples=150, deadline=None)
 def test_damaged_messages_are_marked_or_read_as_they_stand(
     damage: list[tuple[int, int, int]], cuts: list[int], gaps: tuple[int, ...], joints: int
 ) -> None:

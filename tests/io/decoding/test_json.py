@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
@@ -264,7 +264,6 @@ def test_no_messages_give_no_values(way: str) -> None:
 
 
 @given(values=st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=3, max_size=30))
-@settings(max_examples=40, deadline=None)
 def test_floats_are_rounded_as_json_rounds_them(values: list[float]) -> None:
     texts = [text for value in values for text in (repr(value), f"{value:.25e}", f"{value:.17g}")]
     messages = [b'{"value": ' + text.encode() + b"}" for text in texts]
@@ -281,7 +280,6 @@ def test_floats_are_rounded_as_json_rounds_them(values: list[float]) -> None:
     at=st.integers(0, 200),
     cut=st.integers(0, 12),
 )
-@settings(max_examples=80, deadline=None)
 def test_damaged_bytes_give_what_the_rules_give(content: list[bytes], at: int, cut: int) -> None:
     messages = [json.dumps({"value": index, "samples": [index] * 2}).encode() for index in range(len(content))]
     damaged = []

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from google.protobuf import descriptor_pb2, message_factory
 from google.protobuf.descriptor_pool import DescriptorPool
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
@@ -79,7 +79,6 @@ def assert_every_element(decoder: Decoder, encoded: Encoded, written: Sequence[A
 
 
 @given(root=st.sampled_from([1, 2]).flatmap(lambda ros: st.tuples(messages(ros=ros), st.just(ros))), data=st.data())
-@settings(max_examples=40, deadline=None)
 def test_any_ros_definition_gives_every_element_that_rosbags_wrote(root: Any, data: st.DataObject) -> None:
     message, ros = root
     oracle = Oracle(message, ros=ros)
@@ -179,7 +178,6 @@ def in_json(depth: int) -> st.SearchStrategy[Any]:
 
 
 @given(written=st.lists(st.fixed_dictionaries({"a": in_json(1), "b": in_json(2), "e": in_json(0)}), min_size=1))
-@settings(max_examples=60, deadline=None)
 def test_lists_in_lists_of_json_give_every_element(written: list[Any]) -> None:
     encoded = batch_of([json.dumps(one).encode() for one in written])
     decoder = make_decoder(message_encoding="json", schema_name="", schema_encoding="", schema_data=b"")

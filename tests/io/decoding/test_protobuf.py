@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from google.protobuf import descriptor_pb2, duration_pb2, message_factory, struct_pb2, timestamp_pb2
 from google.protobuf.descriptor_pool import DescriptorPool
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.decoding import make_decoder, protobuf_messages
@@ -136,7 +136,6 @@ PLAIN = ["stamp", "age", "accel.x", "accel.z", "f", "i", "s", "u", "x", "b", "ra
     seed=st.integers(0, 2**32),
     damage=st.lists(st.tuples(st.integers(0, 7), st.integers(0, 150), st.integers(0, 255)), max_size=4),
 )
-@settings(max_examples=150, deadline=None)
 def test_shared_layouts_give_what_the_library_gives(
     layouts: list[int], seed: int, damage: list[tuple[int, int, int]]
 ) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -349,7 +349,6 @@ def series_of(values: np.ndarray, valid: np.ndarray | None = None, **fields: obj
     return TimeSeries(**(options | fields))
 
 
-@settings(max_examples=30, deadline=None)
 @given(values=arrays(np.float64, (2, 40), elements=st.floats(-1e300, 1e300)), start_ns=st.sampled_from([0, START_NS]))
 def test_every_digit_comes_back(tmp_path_factory: pytest.TempPathFactory, values: np.ndarray, start_ns: int) -> None:
     series = series_of(values, start_time_ns=start_ns)
@@ -437,7 +436,6 @@ def test_columns_that_are_shown_alike_are_told_apart(tmp_path: Path) -> None:
 SEPARATORS = "\v\f\x1c\x1d\x1e\x1f\x85\u2028\u2029"
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     remark=st.lists(st.text(st.sampled_from(f'ab #"{SEPARATORS}'), max_size=6), max_size=4),
     mark=st.sampled_from(SEPARATORS),

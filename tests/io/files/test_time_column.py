@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pyarrow import feather, parquet
 from scipy.io import savemat
@@ -218,7 +218,6 @@ def test_a_date_that_can_be_read_in_two_ways_is_not_used(tmp_path: Path) -> None
     assert "may have the day or the month first" in contents.notes[0]
 
 
-@settings(max_examples=50, deadline=None)
 @given(
     start=st.integers(0, 4 * 10**9),
     steps=st.lists(st.integers(0, 10**7), min_size=2, max_size=30),

@@ -760,7 +760,7 @@ def nodes_set() -> list[dict[str, object]]:
     return [{"type": 15, "node_nums": [1, 2], "x": [0.0, 1.0], "y": [0.0, 0.0], "z": [0.0, 0.0]}]
 
 
-@settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])
+@settings(suppress_health_check=[HealthCheck.too_slow])
 @given(modes=ours.mode_sets(), geometry=ours.geometries())
 def test_any_modes_are_written_and_read(
     tmp_path_factory: pytest.TempPathFactory, modes: ModeSet, geometry: Geometry
@@ -775,7 +775,7 @@ def test_any_modes_are_written_and_read(
         np.testing.assert_array_equal(np.abs(found.modes.shapes).max(axis=1), 1.0)
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_damaged_files_are_refused_or_read_and_never_crash(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -102,7 +102,6 @@ def test_values_that_are_no_numbers_are_no_reason_to_doubt_a_format() -> None:
     np.testing.assert_array_equal(found, wave)
 
 
-@settings(deadline=None, max_examples=60)
 @given(
     values=st.lists(st.floats(-1e6, 1e6, width=32, allow_subnormal=False), min_size=1, max_size=40),
     order=st.sampled_from((1, 2)),

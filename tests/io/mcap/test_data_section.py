@@ -272,7 +272,7 @@ def test_more_messages_than_the_statistics_count_are_told_too(tmp_path: Path) ->
     chunk_size=st.integers(1, 300),
     empty=st.booleans(),
 )
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_whole_log_in_chunks_of_any_size_is_sound(
     tmp_path: Path, order: list[int], sizes: list[int], chunk_size: int, empty: bool
 ) -> None:

@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.mcap.message_table import MessageTable, message_headers, table_from_index, table_from_walk
@@ -37,7 +37,6 @@ def assert_same(one: MessageTable, other: MessageTable) -> None:
 MESSAGES = st.lists(st.tuples(st.integers(1, 4), st.integers(0, 60), st.booleans()), min_size=1, max_size=80)
 
 
-@settings(deadline=None, max_examples=60)
 @given(chosen=MESSAGES)
 def test_index_and_walk_agree(chosen: list[tuple[int, int, bool]]) -> None:
     content = b""
@@ -69,7 +68,6 @@ def test_one_channel_backwards_is_sorted_by_offset() -> None:
 
 
 @given(channels=st.integers(1, 700), repeats=st.integers(1, 3), gap=st.booleans())
-@settings(max_examples=30)
 def test_any_number_of_other_records_between_messages_is_sound(channels: int, repeats: int, gap: bool) -> None:
     definitions = [lb.channel(number) for number in range(channels)]
     content = b"".join(

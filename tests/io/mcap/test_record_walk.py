@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.mcap import record_walk
@@ -32,7 +32,6 @@ RECORDS = st.tuples(st.sampled_from([3, 4, 5, 5, 5, 6, 0x90]), st.integers(20, 4
 RUNS = st.lists(st.tuples(st.lists(RECORDS, min_size=1, max_size=5), st.integers(1, 120)), max_size=5)
 
 
-@settings(deadline=None, max_examples=60)
 @given(runs=RUNS, cut=st.integers(0, 30), junk=st.binary(max_size=20), ends=st.booleans())
 def test_leaps_find_what_steps_find(
     runs: list[tuple[list[tuple[int, int]], int]], cut: int, junk: bytes, ends: bool

@@ -148,7 +148,7 @@ def test_a_summary_that_lists_no_chunk_hides_none(
 
 
 @given(data=st.data())
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_summary_that_omits_whatever_it_likes_hides_nothing(tmp_path: Path, data: st.DataObject) -> None:
     """Every part of a summary may be missing: what can be read stays the same, or the loss is counted."""
     chunks = data.draw(st.lists(st.sets(st.integers(1, 5), min_size=1), min_size=1, max_size=5), label="channels")

@@ -198,7 +198,7 @@ def binomial_limits(trials):
         (independent_noise, (0,), 90, {"lines": 200}),
         (independent_noise, (0, 2), 90, {"lines": 200}),
         (few_periods, (0,), 90, {"lines": 200}),
-        (averaged_random, (0,), 40, {"cycles": 600, "resolution_hz": 1 / 40}),
+        pytest.param(averaged_random, (0,), 40, {"cycles": 600, "resolution_hz": 1 / 40}, marks=pytest.mark.nightly),
         # Few long segments, as they are chosen for modes: leakage nearly cancels in frequencies.
         pytest.param(
             averaged_random, (0,), 25, {"cycles": 2000, "resolution_hz": 1 / 250}, marks=pytest.mark.nightly

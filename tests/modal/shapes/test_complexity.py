@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.modal.shapes.complexity import deviation_from_noise, mean_phase, phase_collinearity
@@ -49,7 +49,6 @@ def test_an_upright_shape_points_up_not_down() -> None:
     np.testing.assert_allclose(found.phase_deg, [90.0, 90.0], rtol=1e-12)
 
 
-@settings(max_examples=40)
 @given(ours.mode_sets(min_modes=1), st.floats(-100, 100), st.floats(0.1, 6))
 def test_a_complex_factor_changes_only_the_mean_phase(modes, exponent, phase) -> None:  # type: ignore[no-untyped-def]
     factor = 10.0**exponent * np.exp(1j * phase)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from chladni.apps.modes import identify_modes
 from chladni.io.log import open_log
@@ -91,7 +91,6 @@ def test_three_accelerometers_on_an_aircraft(shared_data: Path) -> None:
     assert "3 channels don't tell the shapes of" in checks.findings[0]
 
 
-@settings(max_examples=40)
 @given(ours.mode_sets())
 def test_pairs_are_ordered_and_the_most_alike_come_first(modes) -> None:  # type: ignore[no-untyped-def]
     likeness = auto_mac(modes)

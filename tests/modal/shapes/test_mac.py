@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.modal.shapes.mac import auto_mac, cross_mac, mac, parallel_sign, shared_channels
@@ -40,7 +40,6 @@ def test_one_mode_gives_a_matrix_too() -> None:
     assert mac(np.zeros((0, 3)), [[1.0, 2.0, 3.0]]).shape == (0, 1)
 
 
-@settings(max_examples=40)
 @given(st.data())
 def test_a_complex_factor_changes_nothing(data: st.DataObject) -> None:
     modes = data.draw(ours.mode_sets(min_modes=1))

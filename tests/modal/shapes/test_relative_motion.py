@@ -5,7 +5,7 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.modal.shapes.neighbours import neighbour_note
@@ -220,7 +220,6 @@ def test_error_bar_of_transmissibility() -> None:
     assert np.std([step.ratio for step in first]) == pytest.approx(predicted, rel=0.05)  # type: ignore[arg-type]
 
 
-@settings(max_examples=50)
 @given(ours.mode_sets(max_channels=4), ours.geometries())
 def test_ratios_stay_within_their_bounds(modes, geometry) -> None:  # type: ignore[no-untyped-def]
     found = relative_motion(modes, geometry)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from chladni.modal.shapes.validation import validate
 from chladni.signals.channel import Channel
@@ -133,7 +133,6 @@ def test_no_modes_is_an_answer() -> None:
     assert found.findings == ()
 
 
-@settings(max_examples=50)
 @given(ours.mode_sets())
 def test_any_modes_can_be_validated(modes: Any) -> None:
     found = validate(modes)

@@ -20,7 +20,7 @@ WRONG: list[Any] = [
     "", "ground", "wrist", "3 kg", "1e400 N", "-1 N", "x" * 300, "\x00", 0.0, -1.0, 1e308, 5e-324, True,
     [], [1.0], ["a", "b"], [[1.0]], {}, {"a": 1.0}, [{}], [{"name": "wrist"}], {"force": {"x": 1.0}},
 ]  # fmt: skip
-SETTINGS = settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SETTINGS = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def paths_in(content: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:

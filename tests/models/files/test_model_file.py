@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.models.core.compiled_model import CompiledModel
@@ -243,7 +243,6 @@ def structures(draw: st.DrawFn) -> StructureModel:
 
 
 @given(model=structures())
-@settings(max_examples=60)
 def test_any_structure_survives_its_file(model: StructureModel, tmp_path_factory: pytest.TempPathFactory) -> None:
     path = tmp_path_factory.mktemp("model") / "m.toml"
     write_model(model, path)

@@ -1,7 +1,7 @@
 """Files are untrusted: what they hold gives a scheme or mistakes with places, and a scheme compiles or says why."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.models.elements.catalogue import ELEMENTS
@@ -34,7 +34,6 @@ def tables_of(keys: tuple[str, ...]) -> st.SearchStrategy[object]:
         },
     )
 )
-@settings(max_examples=100)
 def test_any_content_is_read_or_told(content: dict[str, object]) -> None:
     reading = read_scheme("x", content)
     assert (reading.model is None) == bool(reading.mistakes)
@@ -62,7 +61,6 @@ def wild_blocks(draw: st.DrawFn) -> list[dict[str, object]]:
 
 
 @given(wild_blocks())
-@settings(max_examples=60)
 def test_numbers_of_any_size_compile_or_are_refused_in_words(blocks: list[dict[str, object]]) -> None:
     reading = read_scheme("x", {"input": [{"name": "u"}], "block": blocks})
     if reading.model is None:

@@ -1,5 +1,5 @@
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 
 from chladni.models.schemes.scheme_model import SchemeModel
 from chladni.signals.errors import ModelError
@@ -23,7 +23,6 @@ def assert_equal(found: np.ndarray, expected: np.ndarray, condition: np.ndarray)
 
 
 @given(schemes())
-@settings(max_examples=100)
 def test_every_point_is_the_brute_force_interconnection(scheme: SchemeModel) -> None:
     expected, condition = brute_force(scheme, FREQUENCY_HZ)
     assume(condition.max() < 1e6)
@@ -31,7 +30,6 @@ def test_every_point_is_the_brute_force_interconnection(scheme: SchemeModel) -> 
 
 
 @given(schemes())
-@settings(max_examples=200)
 def test_the_compiled_equations_have_the_same_response(scheme: SchemeModel) -> None:
     try:
         compiled = scheme.compile()
@@ -47,7 +45,6 @@ def test_the_compiled_equations_have_the_same_response(scheme: SchemeModel) -> N
 
 
 @given(schemes(kinds=PROPER))
-@settings(max_examples=40)
 def test_a_proper_scheme_has_a_state_for_each_pole_and_no_lags(scheme: SchemeModel) -> None:
     try:
         compiled = scheme.compile()

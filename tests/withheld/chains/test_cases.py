@@ -56,7 +56,9 @@ def scene_for(word, footing):
     return None
 
 
-@pytest.mark.parametrize("footing", ["grounded", "loop", "drive"])
+@pytest.mark.parametrize(
+    "footing", ["grounded", *(pytest.param(one, marks=pytest.mark.nightly) for one in ("loop", "drive"))]
+)
 @pytest.mark.parametrize("word", [*DRAWN, *OUTSIDE_DRAWN])
 def test_every_draft_moves_the_outputs_the_more_the_larger(word, footing):
     found = scene_for(word, footing)

@@ -20,6 +20,8 @@ from chladni_withheld.networks.plots import with_word
 from chladni_withheld.vocabulary import OUTSIDE, WORDS
 
 KINDS = tuple(DEFAULT)
+# What a kind hides is in its truth; users' files differ by what is connected and by what is stated wrongly.
+FILES = ("effect", "topology", "value")
 SEED = 35
 
 
@@ -37,11 +39,11 @@ def cases():
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     directory = tmp_path_factory.mktemp("networks")
-    make_cases(directory, count=len(KINDS), seed=SEED, generator="networks", kinds=[f"{kind}=1" for kind in KINDS])
+    make_cases(directory, count=3, seed=SEED, generator="networks", kinds=[f"{kind}=1" for kind in FILES])
     return directory
 
 
-def test_users_load_every_kind(campaign):
+def test_users_load_cases(campaign):
     for case in case_folders(campaign):
         model = chladni.load_model(campaign / "cases" / case.name / "model.toml")
         log = chladni.open_log(campaign / "cases" / case.name / "log.mcap")
@@ -62,7 +64,9 @@ def test_the_command_reads_a_log_of_this_kind(campaign):
     assert {channel["jitter_s"] for channel in told["channels"]} == {0.0}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [kind if kind == "effect" else pytest.param(kind, marks=pytest.mark.nightly) for kind in KINDS]
+)
 def test_the_same_three_give_the_same_case(cases, kind):
     index = KINDS.index(kind) + 1
     again = draw_case(SEED, index, kind)
