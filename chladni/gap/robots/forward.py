@@ -29,6 +29,8 @@ from chladni.signals.arrays import Mask, Real
 #: Least length of the blocks of which every other one judges, in periods of the cutoff.
 _PERIODS = 16.0
 _ROUNDING = 1e-6
+#: Standard deviations of a tolerance that a value may stand aside.
+_INSIDE = 3.0
 #: A drive gives at most ten times what it's asked for.
 _LEAST_OVER = 0.1
 _ANGLES = ("gravity_tilt", "misalignment")
@@ -103,7 +105,9 @@ class _Reading:
         self._described = {one.joint.name: one for one in described.joints}
         self._joints = dict(self._described)
         self._terms = [(term, fit.values(place)[0]) for place, term in enumerate(fit.terms)]
-        self._within = dict(zip(contest.tolerated, fit.numbers[: fit.within].tolist(), strict=True))
+        # What stands farther aside is no tolerance any more.
+        within = np.clip(fit.numbers[: fit.within], -_INSIDE, _INSIDE)
+        self._within = dict(zip(contest.tolerated, within.tolist(), strict=True))
 
     def machine(self) -> Machine:
         for name in self._torques.log.joints:
