@@ -303,7 +303,7 @@ class _Reader:
         return self._in_newton_metres(values) if name == "effort" else values
 
     def _is_same_effort(self, state: JointTopic, command: JointTopic) -> bool:
-        """Whether states hold a copy of the commands' efforts, which is no measurement where nobody says what it is."""
+        """Whether states hold a copy of the commands' efforts, which measures nothing unless somebody says so."""
         if self._robot.log.effort is not None:
             return False
         fields = [one.fields().get("effort", "") for one in (state, command)]

@@ -132,12 +132,12 @@ class MachineJoint:
 
     def with_share(self, share: float) -> MachineJoint:
         """Give the same with laws that were found in units of torque that was asked, where a share of it arrives."""
-        loop, ripple = self.loop, self.ripple
+        loop, wave = self.loop, self.ripple
         return replace(
             self, rise=share * self.rise, quadratic=share * self.quadratic, load=share * self.load,
             stiffness=share * self.stiffness, torque=share * self.torque,
             loop=None if loop is None else replace(loop, force=share * loop.force),
-            ripple=None if ripple is None else replace(ripple, sine=share * ripple.sine, cosine=share * ripple.cosine),
+            ripple=None if wave is None else replace(wave, sine=share * wave.sine, cosine=share * wave.cosine),
             stops=tuple(replace(one, stiffness=share * one.stiffness) for one in self.stops),
         )  # fmt: skip
 

@@ -139,7 +139,7 @@ class Contest:
         self._whiten = np.sqrt(torques.numbers_a_sample) * there / torques.noise[:, None]
         self.count = torques.numbers_a_sample * np.sum(there, axis=1)
         self._there = np.any(self._blocks, axis=2)
-        self._gram, self._right = self._moments(self._blocks, self._there)
+        self._gram, self._right = self._moments(self._blocks, self._there, self._blocks, self._there)
         self._energy = np.sum((torques.missing * self._whiten) ** 2, axis=1)
         self._start = 1.0 / (1.0 + np.maximum(self._energy - self.count, 0.0) / np.maximum(self.count, 1.0))
         starts = np.cumsum([self.within, *(len(term.scale) for term in self.terms)])
@@ -159,55 +159,59 @@ class Contest:
         """Columns of the joints alone with rows of zeros for their loops."""
         return np.pad(columns, ((0, 0), (0, len(self.torques.missing) - columns.shape[1]), (0, 0)))
 
-    def _moments(self, some: Real, there: Mask) -> tuple[Real, Real]:
+    def _moments(self, some: Real, there: Mask, blocks: Real, anywhere: Mask) -> tuple[Real, Real]:
         """Give ``[row, some, all]`` of whitened columns, and ``[row, some]`` with what is missing.
 
         Parameters
         ----------
-        there
-            ``[some, row]``: where they aren't zero.
+        some, blocks
+            ``[number, row, coarse]``: some columns, and all.
+        there, anywhere
+            ``[number, row]``: where they aren't zero.
         """
-        gram = np.zeros((some.shape[1], len(some), len(self._blocks)))
+        gram = np.zeros((some.shape[1], len(some), len(blocks)))
         right = np.zeros(gram.shape[:2])
         for row, whiten in enumerate(self._whiten):
             # Most columns are laws of another joint.
-            here, others = np.flatnonzero(there[:, row]), np.flatnonzero(self._there[:, row])
+            here, others = np.flatnonzero(there[:, row]), np.flatnonzero(anywhere[:, row])
             if here.size:
                 left = some[here, row] * whiten**2
-                gram[row][np.ix_(here, others)] = left @ self._blocks[others, row].T
+                gram[row][np.ix_(here, others)] = left @ blocks[others, row].T
                 right[row, here] = left @ self.torques.missing[row]
         return gram, right
 
-    def _copied(self) -> "Contest":
+    def _with(self, **parts: object) -> "Contest":
+        """Give the same at the same prices, but for these parts."""
         other = copy(self)
         vars(other).pop("_alike", None)
+        vars(other).update(parts)
         return other
 
     def narrowed(self, terms: Sequence[Term]) -> "Contest":
         """Give the contest of these terms alone, at the same prices."""
-        chosen, other = self._chosen(terms), self._copied()
-        other.terms = list(terms)
-        other._blocks, other._least, other._there = self._blocks[chosen], self._least[chosen], self._there[chosen]
-        other._gram, other._right = self._gram[:, chosen[:, None], chosen], self._right[:, chosen]
+        chosen = self._chosen(terms)
         counts = np.cumsum([self.within, *(len(term.scale) for term in terms)])
-        other._places = {id(term): np.arange(a, a + len(term.scale)) for term, a in zip(terms, counts, strict=False)}
-        return other
+        return self._with(
+            terms=list(terms), _blocks=self._blocks[chosen], _least=self._least[chosen], _there=self._there[chosen],
+            _gram=self._gram[:, chosen[:, None], chosen], _right=self._right[:, chosen],
+            _places={id(term): np.arange(a, a + len(term.scale)) for term, a in zip(terms, counts, strict=False)},
+        )  # fmt: skip
 
     def joined(self, term: Term) -> "Contest":
         """Give the contest with one term more, at the same prices."""
-        other, columns = self._copied(), self._padded(term.columns) * term.scale[:, None, None]
-        first, count = len(self._blocks), len(columns)
-        other.terms = [*self.terms, term]
-        there = np.any(columns, axis=2)
-        other._blocks, other._there = np.concatenate([self._blocks, columns]), np.concatenate([self._there, there])
-        gram, right = other._moments(columns, there)
+        columns = self._padded(term.columns) * term.scale[:, None, None]
+        first, count, there = len(self._blocks), len(columns), np.any(columns, axis=2)
+        blocks, anywhere = np.concatenate([self._blocks, columns]), np.concatenate([self._there, there])
+        gram, right = self._moments(columns, there, blocks, anywhere)
         whole = np.zeros((len(gram), first + count, first + count))
         whole[:, :first, :first] = self._gram
         whole[:, first:], whole[:, :, first:] = gram, np.swapaxes(gram, 1, 2)
-        other._gram, other._right = whole, np.concatenate([self._right, right], axis=1)
-        other._least = np.concatenate([self._least, term.least / term.scale])
-        other._places = {**self._places, id(term): np.arange(first, first + count)}
-        return other
+        return self._with(
+            terms=[*self.terms, term], _blocks=blocks, _there=anywhere, _gram=whole,
+            _right=np.concatenate([self._right, right], axis=1),
+            _least=np.concatenate([self._least, term.least / term.scale]),
+            _places={**self._places, id(term): np.arange(first, first + count)},
+        )  # fmt: skip
 
     def fit(self, terms: Sequence[Term], near: "Fit | None" = None) -> Fit:
         """Fit a set: most probable numbers, each joint weighed by how far from its noise it is left.
@@ -360,7 +364,7 @@ class Contest:
         return np.asarray(added / np.maximum(self._energy, np.maximum(self.count, 1.0)))
 
     def over_rounding(self, energy: Real) -> Real:
-        """Give ``[row]``: RMS torque of a whitened energy, over what any description of the torque's changes rounds."""
+        """Give ``[row]``: RMS torque of a whitened energy, over what a description of its changes rounds."""
         power = energy / np.maximum(self.count, 1.0) * self.torques.noise**2
         changes = np.resize(np.std(self.torques.drive, axis=1), power.size)
         return np.asarray(np.sqrt(power) / np.maximum(RIGHT * changes, 1e-300))

@@ -1,4 +1,4 @@
-"""Gains of position loops that nobody knows, guessed from how far joints lag their commands for the torque they need."""
+"""Gains of position loops that nobody says, guessed from how far commands lead for the torque that joints need."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -39,10 +39,11 @@ def unknown_gains(torques: Torques) -> list[str]:
 
 
 def guessed_gains(torques: Torques, names: list[str]) -> Gains:
-    """Give gains of joints, by least squares of the command's lead over the position; none where efforts say another.
+    """Give gains of joints by least squares of how far commands lead; none where efforts say another law.
 
-    Efforts that are known are ``kp lead - kd v`` of a position loop. Else the lead is ``(torque + armature a + damping v + friction sgn v)/kp`` and a constant; the stiffness is what the
-    torque of the described masses tells. Joints whose load is too small take the mean of all.
+    Efforts that are known are ``kp lead - kd v`` of a position loop. Else the lead is ``(torque + armature a +
+    damping v + friction sgn v)/kp`` and a constant; the stiffness is what the torque of the described masses tells.
+    Joints whose load is too small take the mean of all.
 
     Raises
     ------
@@ -62,8 +63,8 @@ def guessed_gains(torques: Torques, names: list[str]) -> Gains:
     pooled = float(np.sum(weight * compliance) / np.sum(weight)) if np.any(weight > 0) else 0.0
     if not pooled * np.sqrt(np.sum(weight)) > _TOLD_BY:
         raise ModelError(
-            f"{torques.robot.name}: no gains of its drives, {torques.log.log} has no measured effort, and no joint bears "
-            "enough of its weight to tell its stiffness; give kp and kd under [control] of a robot file"
+            f"{torques.robot.name}: no gains of its drives, {torques.log.log} has no measured effort, and no joint "
+            "bears enough of its weight to tell its stiffness; give kp and kd under [control] of a robot file"
         )
     kp = 1.0 / np.where(compliance > _TOLD_BY * spread, compliance, pooled)
     kd = kp * np.maximum(damps, _LEAST_S)

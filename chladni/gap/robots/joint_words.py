@@ -19,7 +19,7 @@ _SLIDES, _YIELDS = (0.01, 0.03, 0.08), (0.16, 0.32, 0.64)
 _STOPS = (0.6, 0.75, 0.85, 0.93)
 #: Friction that grows with the load, before a log is seen.
 _BY_LOAD = 0.3
-#: Fewest waves of a ripple that a joint passes; lines between two that can be told apart; highest peaks that are tried.
+#: Fewest waves of a ripple that a joint passes, lines between two that can be told apart, highest peaks tried.
 _WAVES, _FINE, _PEAKS = 3.0, 4, 2
 #: Waves over a joint's way that are looked for at most.
 _MOST_WAVES = 128
@@ -187,7 +187,8 @@ def _periods(torques: Torques, row: int) -> tuple[list[float], int]:
         return [], 1
     waves = np.arange(lowest, highest, 2.0 * np.pi / way / _FINE)[: _MOST_WAVES * _FINE]
     # What moves with the joint as other words do is none.
-    smooth = [np.ones_like(q), q, q**2, q**3, torques.velocity[row], torques.acceleration[row], torques.sign[row], torques.wanted[row]]  # fmt: skip
+    moves = torques.velocity[row], torques.acceleration[row], torques.sign[row], torques.wanted[row]
+    smooth = [np.ones_like(q), q, q**2, q**3, *moves]
     there = torques.moving[row]
     basis, _ = np.linalg.qr(np.array(smooth)[:, there].T)
     turns = torques.waves(row, waves)[:, there]

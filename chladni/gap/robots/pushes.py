@@ -1,4 +1,4 @@
-"""Stretches of a log in which something pushes: a torque of any shape for a while, which no law of a joint explains."""
+"""Stretches of a log in which something pushes: a torque of any shape for a while, which no law explains."""
 
 from dataclasses import dataclass
 from math import log
@@ -36,7 +36,7 @@ class Push:
 
 
 def pushed(contest: Contest, fit: Fit) -> tuple[tuple[float, float], ...]:
-    """Give the stretches that hold most of what a fit leaves beyond the noise; none where it's spread over the log."""
+    """Give the stretches that hold most of what a fit leaves beyond the noise; none where it's spread."""
     torques = contest.torques
     energy, count = contest.course(fit)
     if not count.any():

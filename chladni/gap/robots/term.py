@@ -189,6 +189,6 @@ def law(
 ) -> Term:  # fmt: skip
     """Give a law of one joint."""
     return Term(
-        word=word, site=torques.joints[row].name, columns=at_row(torques, row, *columns), numbers=numbers, rows=(row,),
-        variant=variant, rare=rare,
+        word=word, site=torques.joints[row].name, columns=at_row(torques, row, *columns), numbers=numbers,
+        rows=(row,), variant=variant, rare=rare,
     )  # fmt: skip

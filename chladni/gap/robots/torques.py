@@ -532,7 +532,7 @@ class Torques:
 
     @cached_property
     def asked(self) -> Real:
-        """``[joint, coarse]``: torque that the loops ask for; the drives' where the log has no efforts beside them."""
+        """``[joint, coarse]``: torque that the loops ask for; the drives' where no efforts stand beside them."""
         return self.smooth(self._limited(np.nan_to_num(self._served))) if self.two_sided else self.drive
 
     @cached_property
@@ -591,7 +591,7 @@ class Torques:
     def missing(self) -> Real:
         """``[row, coarse]``: what the drives gave beyond what the motion and the described friction needed.
 
-        Where the log tells commands and efforts, further rows, one a joint, hold what the loops asked for beyond that.
+        Where the log tells commands and efforts, further rows, one a joint, hold what the loops asked for beyond.
         """
         lacks = self.drive - self.wanted
         return np.concatenate([lacks, self.asked - self.drive]) if self.two_sided else lacks
@@ -601,7 +601,7 @@ class Torques:
         return steps_and_noise(self.log.position, self.log.sample_rate_hz, self.stretches)
 
     def whole(self, missing: Real) -> Real:
-        """Give ``[joint, ...]`` of rows: what the loops asked for beyond what was needed, where these tell both parts."""
+        """Give ``[joint, ...]`` of rows: what loops asked for beyond what was needed, where rows tell both parts."""
         count = len(self.joints)
         return np.asarray(missing[:count] + missing[count:] if self.two_sided else missing)
 

@@ -1,0 +1,73 @@
+"""Laws with a number that isn't linear: made by the engine that runs machines, with encoders of 16 bit."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chladni.gap.robots.diagnose import diagnose_robot
+from chladni.robots.machine import Loop, Machine, Ripple, Stop, Transmission, as_described
+from tests.robots.machines import RATE_HZ, arm, changed, commands, course, joint_log_of
+
+pytest.importorskip("mujoco")
+
+STEP = 2.0 * np.pi / 2**16
+SECONDS = 12.0
+
+
+def motor(**numbers: float) -> Transmission:
+    """A motor that runs ahead of its link, on which the encoder sits."""
+    return Transmission(**{"stiffness": np.inf, "gap": 0.0, "inertia": 0.2, "logs_motor": False} | numbers)
+
+
+# What is changed at the shoulder, and the number that tells it.
+LAWS = {
+    "hysteresis": (lambda one: changed(one, 0, loop=Loop(force=5.0, yields=0.15)), "yield", 0.15),
+    "ripple": (lambda one: changed(one, 0, ripple=Ripple(sine=3.0, cosine=1.0, period=0.4)), "period", 0.4),
+    "one_sided_stop": (
+        lambda one: changed(one, 0, stops=(Stop(stiffness=60.0, clearance=0.3, side=1.0),)), "clearance", 0.3,
+    ),
+    "dead_zone": (lambda one: changed(one, 0, dead=3.0), "width", 3.0),
+    "rate_limit": (lambda one: changed(one, 0, rate=2.5), "rate", 2.5),
+    "backlash": (lambda one: changed(one, 0, transmission=motor(gap=0.15)), "gap", 0.15),
+    "joint_elasticity": (lambda one: changed(one, 0, transmission=motor(stiffness=400.0)), "stiffness", 400.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("word", LAWS)
+def test_a_law_is_named_with_its_number(word: str, tmp_path: Path) -> None:
+    change, name, value = LAWS[word]
+    robot, command = arm(tmp_path), commands(SECONDS)
+    found = diagnose_robot(robot, joint_log_of(robot, read(change(as_described(robot)), command), command=command))
+    assert [(one.effect, one.site) for one in found.causes] == [(word, "shoulder")]
+    assert found.causes[0].probability > 0.6
+    assert found.causes[0].parameters[name].value == pytest.approx(value, rel=0.15)
+    assert found.gap.after < 0.5 * found.gap.before
+
+
+def read(machine: Machine, command: np.ndarray) -> np.ndarray:
+    """What the encoders say."""
+    return STEP * np.rint(course(machine, command) / STEP)
+
+
+def test_a_push_is_told_with_its_joint_and_time(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(SECONDS)
+    time_s = np.arange(command.shape[1]) / RATE_HZ
+    drives = as_described(robot)
+    # A push on the elbow is what a command would do that moves by as much.
+    pushed = command + 0.1 * np.stack([0.0 * time_s, np.exp(-(((time_s - 6.0) / 0.15) ** 2))])
+    found = diagnose_robot(robot, joint_log_of(robot, read(drives, pushed), command=command))
+    assert (found.verdict, found.causes) == ("unknown", ())
+    assert found.advice is not None
+    assert found.advice.startswith("Something pushes at elbow")
+    start, end = (
+        float(each) for each in found.advice.split(" from ")[1].split(", ")[0].replace(" s", "").split(" to ")
+    )
+    assert 5.2 < start < 6.0 < end < 6.8
+
+
+def test_a_pause_of_the_loop_is_no_delay(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(SECONDS)
+    late = changed(changed(as_described(robot), 0, delay_s=5e-4), 1, delay_s=5e-4)
+    found = diagnose_robot(robot, joint_log_of(robot, read(late, command), command=command))
+    assert found.verdict == "none"
