@@ -265,7 +265,8 @@ class Contest:
         # What machines rarely have is one thing more than what most have.
         nats += log(ANOTHER) * sum(term.rare for term in terms)
         # A form that was chosen among several was one of them by chance.
-        nats -= sum(log(term.form.count) for term in terms if term.form is not None)
+        forms = [term.form for term in terms if term.form is not None]
+        nats -= sum(log(one.count) + 0.5 * (one.value / one.usual) ** 2 for one in forms)
         # Tolerances allow for what values are usually wrong by: more is one thing more.
         nats += log(ANOTHER) * sum(term.word == PARAMETER for term in terms)
         # A law that holds a simpler one, with another number, is one thing more.

@@ -121,8 +121,8 @@ def solved(torques: Torques, left_out: frozenset[str], progress: Callable[[float
         torques = _guessing(torques, gains)
     if not np.any(torques.driven):
         raise ModelError(
-            f"{torques.robot.name}: no gains of its drives, and {torques.log.log} has no measured effort; give kp and "
-            "kd under [control] of a robot file, or record efforts"
+            f"{torques.robot.name}: no gains of its drives, and {torques.log.log} has no measured effort; give kp "
+            "and kd under [control] of a robot file, or record efforts"
         )
     found = _without_pushes(torques, left_out, progress)
     for _ in range(_GUESSES * bool(gains)):

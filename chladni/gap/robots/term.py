@@ -52,6 +52,8 @@ class Form:
         Of the forms that a log could tell apart.
     make
         Gives the law with a value.
+    usual
+        Standard deviation before the log is seen; nothing is known of it when infinite.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Form:
     high: float
     count: int
     make: Callable[[float], "Term"]
+    usual: float = np.inf
 
     def term(self) -> "Term":
         """Give the law with this form."""
@@ -146,8 +149,9 @@ class Term:
 
 
 def formed(
-    make: Callable[[float], Term], grid: Real, *, name: str, unit: str, count: int | None = None
-) -> list[Term]:
+    make: Callable[[float], Term], grid: Real, *, name: str, unit: str, count: int | None = None,
+    scale: float = np.inf,
+) -> list[Term]:  # fmt: skip
     """Give the terms of a law at the values of a form on a growing grid."""
     step = np.diff(grid)
     # Before the first and behind the last as far as to the next; a form that is positive stays so.
@@ -155,7 +159,7 @@ def formed(
     edges = [float(before), *grid.tolist(), float(grid[-1] + step[-1])]
     forms = [
         Form(name=name, unit=unit, value=value, place=place, low=edges[place], high=edges[place + 2],
-             count=count or grid.size, make=make)
+             count=count or grid.size, make=make, usual=scale)
         for place, value in enumerate(grid.tolist())
     ]  # fmt: skip
     return [one.term() for one in forms]

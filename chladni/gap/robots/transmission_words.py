@@ -15,7 +15,7 @@ from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
 
 #: Of the pose's error under the usual torque of a spring, and of play, before a log is seen: rad (m).
-_GIVES = 0.02
+_GIVES = 0.03
 #: Of its link's inertia: less of a rotor isn't felt.
 LEAST_ROTOR = 0.05
 #: Quantiles of the angle by which a loop is pulled aside at which play is tried.
@@ -109,7 +109,7 @@ def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
 
     grid = 2.0 * np.quantile(np.abs(asked), _PLAYS) / kp
     if grid[0] > 0 and np.all(np.diff(grid) > 0):
-        yield from formed(make, grid, name="gap", unit=length(joint))
+        yield from formed(make, grid, name="gap", unit=length(joint), scale=_GIVES)
 
 
 def _inside(asked: Real, half: float, kp: float, kd: float, step_s: float) -> Real:

@@ -29,7 +29,7 @@ LAWS = {
     ),
     "dead_zone": (lambda one: changed(one, 0, dead=3.0), "width", 3.0),
     "rate_limit": (lambda one: changed(one, 0, rate=2.5), "rate", 2.5),
-    "backlash": (lambda one: changed(one, 0, transmission=motor(gap=0.15)), "gap", 0.15),
+    "backlash": (lambda one: changed(one, 0, transmission=motor(gap=0.1)), "gap", 0.1),
     "joint_elasticity": (lambda one: changed(one, 0, transmission=motor(stiffness=400.0)), "stiffness", 400.0),
 }  # fmt: skip
 
