@@ -14,8 +14,8 @@ from chladni.signals.arrays import Real
 _ZERO_G = 0.1
 #: The same of its delay, s: low-pass filters of such sensors take 2 to 20 ms by their data sheets.
 _IMU_S = 0.005
-#: Half the period of a loop at 500 Hz, s.
-LOOP_S = 1e-3
+#: Half the period of a loop at 1 kHz, s.
+LOOP_S = 5e-4
 
 
 def tolerances(torques: Torques) -> tuple[Real, list[str]]:

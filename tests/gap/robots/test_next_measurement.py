@@ -19,7 +19,7 @@ from chladni.gap.robots.next_measurement import Motion, _log_of, next_measuremen
 from chladni.gap.robots.torques import torques_of
 from chladni.robots.loading import load_robot
 from chladni.robots.robot import Robot
-from tests.robots.machines import ARM, AS_DESCRIBED, RATE_HZ, arm, joint_log_of, run_native
+from tests.robots.machines import ARM, AS_DESCRIBED, RATE_HZ, arm, commands, joint_log_of, run_native
 
 pytest.importorskip("mujoco")
 
@@ -96,7 +96,7 @@ def test_a_motion_is_laid_out_as_a_log_that_lacks_nothing(tmp_path: Path, by_eff
 
 
 def test_what_is_sure_needs_no_further_motion(tmp_path: Path) -> None:
-    found = diagnosed(arm(tmp_path), arm(tmp_path, "machine/arm.xml", **RUBS), at_one_speed(amplitude=0.8))
+    found = diagnosed(arm(tmp_path), arm(tmp_path, "machine/arm.xml", shoulder=' frictionloss="2"'), commands(12.0))
     assert found.causes
     assert found.next_measurement is None
     assert diagnosed(arm(tmp_path), arm(tmp_path), at_one_speed()).next_measurement is None
