@@ -92,8 +92,9 @@ def model_of(machine: Machine, names: Sequence[str]) -> Any:
     model = _coupled(machine) if machine.couplings else copy(machine.robot.model)
     flags = mujoco.mjtDisableBit
     # What drives the joints comes from the log. Shapes of descriptions often overlap, and logs go beyond their stops.
-    for flag in (flags.mjDSBL_ACTUATION, flags.mjDSBL_CONTACT, flags.mjDSBL_LIMIT, flags.mjDSBL_AUTORESET):
-        model.opt.disableflags |= int(flag)
+    for name in ("ACTUATION", "CONTACT", "LIMIT", "AUTORESET"):
+        # Some versions can't be told not to begin anew.
+        model.opt.disableflags |= int(getattr(flags, f"mjDSBL_{name}", 0))
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
     _set_inertials(model, machine)
     follow = {one.name for one in machine.robot.joints if one.follows in names}
@@ -304,7 +305,7 @@ class _Run:
                 law(position, velocity)
             step(model, data)
             # What isn't finite, or turns faster than any joint, went astray: further steps would only warn.
-            if not abs(float(qvel @ qvel)) < _ASTRAY:
+            if not abs(float(qvel @ qvel)) < _ASTRAY or data.time < place * self._driven.step_s:
                 break
         return path
 
