@@ -33,7 +33,8 @@ def robot_gap(
 ) -> Diagnosis:
     """Diagnose a robot; see `chladni.diagnose_gap`."""
     # numba and MuJoCo take a moment to load, which a look at the façade shouldn't pay for.
-    from chladni.gap.robots.diagnose import ROBOT_WORDS, WITHOUT_COLUMN, diagnose_robot
+    from chladni.gap.robots.diagnose import WITHOUT_COLUMN, diagnose_robot
+    from chladni.gap.robots.words import ROBOT_WORDS
 
     left_out, known = frozenset(leave_out), (*ROBOT_WORDS, *WITHOUT_COLUMN)
     for word in sorted(left_out.difference(known)):

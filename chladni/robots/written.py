@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from chladni.io.atomic import atomic_write
 from chladni.io.regular_file import read_text
 from chladni.robots.description import MOST_BYTES, description_kind, parsed, parsed_text, text_of
@@ -173,6 +175,28 @@ def _not_held(one: MachineJoint) -> Iterator[str]:
         yield f"{name}: friction of {one.load:.4g} of the load; {one.friction:.4g} {force} are held"
     if one.rise:
         yield f"{name}: Stribeck friction, {one.rise:.4g} {force} more when slower than {one.fading:.3g} {angle}/s"
+    if one.loop is not None:
+        yield f"{name}: friction of {one.loop.force:.4g} {force} that builds up over {one.loop.yields:.3g} {angle}"
+    if one.ripple is not None:
+        size = float(np.hypot(one.ripple.sine, one.ripple.cosine))
+        yield f"{name}: ripple of {size:.4g} {force} with a period of {one.ripple.period:.4g} {angle}"
+    for stop in one.stops:
+        yield (
+            f"{name}: a stop of {stop.stiffness:.4g} {force}/{angle} {'above' if stop.side > 0 else 'below'} "
+            f"{stop.side * stop.clearance:.4g} {angle}"
+        )
+    if one.transmission is not None:
+        between = one.transmission
+        way = (
+            f"play of {between.gap:.3g} {angle}"
+            if between.gap
+            else f"a spring of {between.stiffness:.4g} {force}/{angle}"
+        )
+        yield f"{name}: {way} between motor and link, and a rotor of {between.inertia:.3g} before it"
+    if one.dead:
+        yield f"{name}: its drive gives nothing below {one.dead:.4g} {force}"
+    if np.isfinite(one.rate):
+        yield f"{name}: its reference goes no faster than {one.rate:.4g} {angle}/s"
     if one.lag_s:
         yield f"{name}: its torque lags by {1e3 * one.lag_s:.3g} ms"
     if one.reading or one.drive_reading:

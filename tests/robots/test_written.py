@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chladni.robots.loading import load_robot
-from chladni.robots.machine import Coupling, Machine, as_described
+from chladni.robots.machine import Coupling, Loop, Machine, Ripple, Stop, Transmission, as_described
 from chladni.robots.written import WrittenRobot, write_robot
 from chladni.signals.errors import LogError
 from tests.robots.machines import RATE_HZ, arm, changed, commands, course, run_native, with_gains
@@ -110,6 +110,26 @@ def test_delays_that_differ_are_those_of_actuators(described: Machine, tmp_path:
     model = load_robot(told.robot).model
     np.testing.assert_allclose(model.actuator_delay, [0.0, 0.02])
     assert told.not_held == ()
+
+
+def test_laws_that_no_description_holds_are_listed(described: Machine, tmp_path: Path) -> None:
+    between = Transmission(stiffness=np.inf, gap=0.02, inertia=0.1, logs_motor=False)
+    machine = changed(described, 0, loop=Loop(force=2.0, yields=0.1), dead=0.5, rate=1.5)
+    machine = changed(machine, 0, ripple=Ripple(sine=3.0, cosine=4.0, period=0.2), transmission=between)
+    machine = changed(machine, 0, stops=(Stop(stiffness=60.0, clearance=0.3, side=-1.0),))
+    told = write_robot(machine, tmp_path / "found.xml").not_held
+    words = (
+        "over 0.1 rad",
+        "ripple of 5 N m",
+        "below -0.3 rad",
+        "play of 0.02 rad",
+        "nothing below 0.5",
+        "1.5 rad/s",
+    )
+    assert len(told) == len(words)
+    for word, one in zip(("over", "ripple", "stop", "play", "nothing", "faster"), told, strict=True):
+        assert word in one
+    assert all(any(word in one for one in told) for word in words)
 
 
 def test_includes_are_put_in_place_and_meshes_found_from_elsewhere(tmp_path: Path) -> None:

@@ -195,7 +195,7 @@ class Weighed:
     acts
         Rows of the joints that it changes.
     is_told
-        Whether its first number is beyond its uncertainty, and not at the edge of what it can be.
+        Whether any of its numbers is beyond its uncertainty, and not at the edge of what it can be.
     is_felt
         Whether more torque would be missing without it than any rigid description rounds.
     nats, gain
@@ -266,27 +266,32 @@ def _weighed(solved: Solved, place: int) -> Weighed:
             dict.fromkeys(Candidate(effect=one.word, site=one.site) for one in near if one.word != term.word)
         ),
         parameters=_parameters(solved, place, candidate),
-        is_told=_is_told(best, place),
+        is_told=bool(np.any(_told(best, place))),
         is_felt=bool(np.max(contest.over_rounding(np.maximum(lost, 0.0))) > 1.0) or strained > TEMPER,
         nats=best.nats - max(rest.nats, unknown),
         gain=best.nats - rest.nats,
     )
 
 
-def _is_told(best: Fit, place: int) -> bool:
+def _told(best: Fit, place: int) -> Mask:
+    """``[number]``: whether it's beyond its uncertainty, and not at the edge of what it can be."""
     values, deviations = best.values(place)
     term = best.terms[place]
     moved = values - term.nominal
-    told = (np.abs(moved) > _SIGMAS * deviations) & (moved > term.least + 1e-3 * term.scale)
-    return bool(np.any(told))
+    return (np.abs(moved) > _SIGMAS * deviations) & (moved > term.least + 1e-3 * term.scale)
 
 
 def _candidate(solved: Solved, place: int) -> Candidate:
-    """What a term is called: less friction, damping or armature than the description has is a wrong value of it."""
+    """What a term is called.
+
+    A law whose last number isn't told is called as the one without; less friction, damping or armature than the
+    description has is a wrong value of it.
+    """
     term = solved.best.terms[place]
-    if term.word in _STATED and not term.is_coupling and solved.best.values(place)[0][0] < term.nominal[0]:
-        return Candidate(effect=PARAMETER, site=f"{term.site}.{_STATED[term.word]}")
-    return Candidate(effect=term.word, site=term.site)
+    word = term.word if term.plainer is None or _told(solved.best, place)[-1] else term.plainer
+    if word in _STATED and not term.is_coupling and solved.best.values(place)[0][0] < term.nominal[0]:
+        return Candidate(effect=PARAMETER, site=f"{term.site}.{_STATED[word]}")
+    return Candidate(effect=word, site=term.site)
 
 
 def _parameters(solved: Solved, place: int, candidate: Candidate) -> dict[str, FittedNumber]:
@@ -296,14 +301,14 @@ def _parameters(solved: Solved, place: int, candidate: Candidate) -> dict[str, F
         mass = float(inertial_numbers(solved.torques.robot)[link, 0])
         ((value, deviation, unit),) = numbers.values()
         return {"value": FittedNumber(value=mass * (1.0 + value), std=mass * deviation, unit=unit, nominal=mass)}
-    nominal = None if term.word not in _STATED else float(term.nominal[0])
-    if candidate.effect == PARAMETER:
-        ((value, deviation, unit),) = numbers.values()
-        return {"value": FittedNumber(value=value, std=deviation, unit=unit, nominal=nominal)}
-    return {
+    if candidate.effect == term.plainer or candidate.effect == PARAMETER:
+        numbers = {term.numbers[0].name: numbers[term.numbers[0].name]}
+    nominal = float(term.nominal[0]) if {candidate.effect, term.word} & _STATED.keys() else None
+    told = {
         name: FittedNumber(value=value, std=deviation if np.isfinite(deviation) else None, unit=unit, nominal=nominal)
         for name, (value, deviation, unit) in numbers.items()
     }
+    return {"value": told[term.numbers[0].name]} if candidate.effect == PARAMETER else told
 
 
 def tuned_parameters(solved: Solved) -> dict[str, FittedNumber]:

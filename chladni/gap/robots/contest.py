@@ -9,7 +9,7 @@ from math import comb, log, log1p
 
 import numpy as np
 
-from chladni.gap.calibration import ANOTHER, DETAILS, ELSEWHERE, USUAL
+from chladni.gap.calibration import ANOTHER, DETAILS, ELSEWHERE, QUARTER, USUAL
 from chladni.gap.records.diagnosis import PARAMETER
 from chladni.gap.robots.term import FOUND, Term
 from chladni.gap.robots.tolerances import tolerances
@@ -127,7 +127,7 @@ class Contest:
         self, torques: Torques, left_out: frozenset[str] = frozenset(), taking_part: Mask | None = None
     ) -> None:
         self.torques = torques
-        self.terms = [term for term in all_terms(torques) if term.word not in left_out]
+        self.terms = all_terms(torques, left_out)
         inside, self.tolerated = tolerances(torques)
         self.within = len(inside)
         blocks = [
@@ -233,7 +233,7 @@ class Contest:
             for first, last, share in arms:
                 least[first] = max(share * float(np.linalg.norm(numbers[first + 1 : last])), 0.0)
                 numbers[first] = max(numbers[first], least[first])
-            left = self._left(gram, right, numbers, laws)
+            left = self._left(gram, right, numbers, laws, self._passing(terms, numbers))
             weight = np.array([one.weight for one in left])
         curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
         covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
@@ -292,8 +292,30 @@ class Contest:
             place += len(term.numbers)
         return [np.array(one, dtype=np.intp) for one in found]
 
-    def _left(self, gram: Real, right: Real, numbers: Real, laws: Sequence[Index]) -> tuple[JointLeft, ...]:
-        energy = self._energy - 2.0 * right @ numbers + (gram @ numbers) @ numbers
+    def _passing(self, terms: Sequence[Term], numbers: Real) -> Real:
+        """Give ``[row]``: share that the energy left is of what it'd be in units of the torque that was asked for.
+
+        What takes nearly all of it would explain anything, as a gain near zero would.
+        """
+        taken: dict[int, Real] = {}
+        place = self.within
+        for term in terms:
+            if term.takes:
+                first = self._places[id(term)][0]
+                for row in np.flatnonzero(self._there[first]).tolist():
+                    taken[row] = taken.get(row, 0.0) + numbers[place] * self._blocks[first, row]
+            place += len(term.numbers)
+        found = np.ones(len(self._energy))
+        for row, part in taken.items():
+            asked = self.torques.asked_of[row]
+            passing = float(np.var(asked - part)) / (float(np.var(asked)) + 1e-300)
+            found[row] = min(passing / QUARTER, 1.0) + 1e-6
+        return found
+
+    def _left(
+        self, gram: Real, right: Real, numbers: Real, laws: Sequence[Index], passing: Real
+    ) -> tuple[JointLeft, ...]:
+        energy = (self._energy - 2.0 * right @ numbers + (gram @ numbers) @ numbers) / passing
         found = []
         for row, places in enumerate(laws):
             own = numbers[places] @ gram[row][np.ix_(places, places)] @ numbers[places]

@@ -13,13 +13,6 @@ from chladni.signals.linear_algebra import in_one_thread
 
 StepProgress = Callable[[str, float], None]
 
-#: Words of robots beside those of effects.md.
-ROBOT_WORDS = (
-    "armature", "backlash", "controller_gain", "coulomb_friction", "dead_zone", "delay", "encoder_offset",
-    "gain_error", "gravity_tilt", "hysteresis", "joint_elasticity", "joint_spring", "lag", "load_friction",
-    "misalignment", "one_sided_stop", "payload", "quadratic_damping", "rate_limit", "ripple", "saturation",
-    "stribeck_friction", "viscous_friction",
-)  # fmt: skip
 #: Words of docs/robots.md that have no column: what they'd name is unknown, and leaving them out changes nothing.
 WITHOUT_COLUMN = ("external_force",)
 

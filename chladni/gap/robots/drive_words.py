@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from chladni.gap.robots.term import Number, Term, at_row, formed, units
-from chladni.gap.robots.torques import ALL_COMMANDS, Torques
+from chladni.gap.robots.torques import ALL_COMMANDS, LEAST_OVER, Torques
+from chladni.robots.joint_laws import followed
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
 
@@ -17,15 +18,13 @@ _GAIN, _DELAY_S, _LAG_S = 0.3, 0.01, 0.02
 _SECANTS_S = (0.01, 0.03)
 #: Of its length: the shortest delay that a secant stands for.
 _OF_SECANT = 0.4
-#: One over a gain, less one, of a drive that gives ten times what it's asked for.
-_MOST_GAIN = -0.9
 
 
 def drives(torques: Torques) -> Iterator[Term]:
     """Give what drives do otherwise than their servos say."""
     for row, joint in torques.told_rows:
         # In units of what was asked the motion needs 1/gain times its torque: so no gain explains all by being small.
-        over = Number(name="over_gain", unit="1", scale=_GAIN, least=_MOST_GAIN, nominal=1.0)
+        over = Number(name="over_gain", unit="1", scale=_GAIN, least=LEAST_OVER - 1.0, nominal=1.0)
         columns = at_row(
             torques, _limited(torques, row), (torques.answered if torques.gives else torques.wanted)[row]
         )
@@ -90,23 +89,13 @@ def _rate_limit(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]
         return
 
     def make(rate: float) -> Term:
-        behind = command - _followed(command, rate / torques.log.sample_rate_hz, torques.stretches)
+        behind = np.zeros_like(command)
+        for a, b in torques.stretches:
+            behind[a:b] = command[a:b] - followed(command[a:b], rate / torques.log.sample_rate_hz)
         return _of_drive(torques, torques.servo_row(row), "rate_limit", torques.kp[row] * torques.smooth(behind))
 
     unit = "rad/s" if joint.kind == "hinge" else "m/s"
     yield from _limits(make, np.quantile(smooth, _LIMITS), "rate", unit)
-
-
-def _followed(command: Real, step: float, stretches: tuple[tuple[int, int], ...]) -> Real:
-    """Follow a command by at most so much a sample."""
-    found = command.copy()
-    for first, last in stretches:
-        state, path = float(command[first]), []
-        for each in command[first:last].tolist():
-            state += min(max(each - state, -step), step)
-            path.append(state)
-        found[first:last] = path
-    return found
 
 
 def _limits(make: Callable[[float], Term], grid: Real, name: str, unit: str) -> Iterator[Term]:
@@ -118,7 +107,7 @@ def _limits(make: Callable[[float], Term], grid: Real, name: str, unit: str) -> 
 def _of_drive(torques: Torques, row: int, word: str, column: Real) -> Term:
     columns = at_row(torques, row, column)
     site = torques.joints[row % len(torques.joints)].name
-    return Term(word=word, site=site, columns=columns, numbers=(_part(),), rare=word != "saturation")
+    return Term(word=word, site=site, columns=columns, numbers=(_part(),), takes=True, rare=word != "saturation")
 
 
 def _gains(torques: Torques) -> Iterator[Term]:
@@ -128,7 +117,7 @@ def _gains(torques: Torques) -> Iterator[Term]:
             word="controller_gain", site=joint.name,
             columns=at_row(torques, torques.servo_row(row), torques.answered[row] + damped, damped),
             numbers=(
-                Number(name="over_kp", unit="1", scale=_GAIN, least=_MOST_GAIN, nominal=1.0),
+                Number(name="over_kp", unit="1", scale=_GAIN, least=LEAST_OVER - 1.0, nominal=1.0),
                 Number(name="kd_over_kp", unit="1", scale=_GAIN),
             ),
         )  # fmt: skip

@@ -31,8 +31,6 @@ _PERIODS = 16.0
 _ROUNDING = 1e-6
 #: Standard deviations of a tolerance that a value may stand aside.
 _INSIDE = 3.0
-#: A drive gives at most ten times what it's asked for.
-_LEAST_OVER = 0.1
 _ANGLES = ("gravity_tilt", "misalignment")
 
 
@@ -149,12 +147,15 @@ class _Reading:
         """Set the gains; what was found in units of torque that was asked, give in units of torque that arrives."""
         one, described = self._joints[name], self._described[name]
         found = {term.word: values for term, values in self._terms if term.site == name}
-        over_kp, kd_over_kp = found.get("controller_gain", np.array([1.0, 0.0]))
-        doubts = self._torques.gain_doubts(self._torques.log.joints.index(name))
-        over_kp = max(float(over_kp) + doubts[0] * self._within.get(f"{name}.kp", 0.0), _LEAST_OVER)
-        kd_over_kp = float(kd_over_kp) + doubts[1] * self._within.get(f"{name}.kd", 0.0)
+        torques, row = self._torques, self._torques.log.joints.index(name)
+        over_kp, kd_over_kp = found.get("controller_gain", np.array([1.0, 0.0])).tolist()
         gain = 1.0 / float(found["gain_error"][0]) if "gain_error" in found else 1.0
-        share = gain / over_kp
+        kp, kd = torques.gains(
+            row, (self._within.get(f"{name}.kp", 0.0), self._within.get(f"{name}.kd", 0.0)), over_kp, kd_over_kp
+        )
+        share = (gain if torques.in_asked("gain_error") else 1.0) * (
+            kp / float(torques.kp[row]) if torques.kp[row] and torques.in_asked("controller_gain") else 1.0
+        )
         one = replace(
             one,
             gain=gain,
@@ -163,7 +164,6 @@ class _Reading:
             armature=max(_towards(described.armature, one.armature, share), 0.0),
         ).with_share(share)
         if one.servo is not None and (one.servo.kp or one.servo.kd):
-            kp, kd = (one.servo.kp or 0.0) / over_kp, (one.servo.kd or 0.0) * (1.0 + kd_over_kp / over_kp)
             # What is read late by a part of the loop's period takes from the damping.
             kd -= kp * LOOP_S * self._within.get("loop", 0.0)
             one = replace(one, servo=replace(one.servo, kp=None if one.servo.kp is None else kp, kd=kd))

@@ -44,7 +44,7 @@ def friction(torques: Torques) -> Iterator[Term]:
         # What the drive gives holds the friction itself: the load is what the motion needs.
         carried = np.abs(torques.of_joints(torques.need.torque)[row]) * sign
         by_load = Number(name="coefficient", unit="1", scale=_BY_LOAD, least=0.0)
-        yield one("load_friction", (sign, carried), dry, by_load)
+        yield one("load_friction", (sign, carried), dry, by_load, plainer="coulomb_friction")
         yield from _stribeck(torques, row, joint, dry)
         yield from _loops(torques, row, joint, dry)
 
@@ -56,7 +56,7 @@ def _stribeck(torques: Torques, row: int, joint: RobotJoint, dry: Number) -> lis
     def make(speed: float) -> Term:
         fades = np.exp(-((fast / speed) ** 2))
         columns = (torques.sign[row], torques.smooth(torques.fast_sign[row] * fades))
-        return law(torques, row, "stribeck_friction", columns, dry, rise)
+        return law(torques, row, "stribeck_friction", columns, dry, rise, plainer="coulomb_friction")
 
     grid = np.array(_STRIBECK) * rms(torques.velocity[row])
     return formed(make, grid, name="speed", unit=unit)

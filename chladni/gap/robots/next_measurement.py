@@ -15,7 +15,7 @@ from chladni.gap.robots.joint_noise import steps_and_noise
 from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import FormKey, Torques
-from chladni.gap.robots.words import all_terms
+from chladni.gap.robots.words import ROBOT_WORDS, all_terms
 from chladni.robots.excite import random_motion
 from chladni.robots.joint_log import JointLog
 from chladni.robots.motion_limits import FREE_TURN, USUAL_SPEED, Shares
@@ -238,9 +238,9 @@ def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
             if term.form is not None
         }
         laid = _laid(torques, robot, _log_of(torques, made), forms)
-        here = all_terms(laid)
         words = {term.word for fit in (doubt.one, doubt.other) for term in fit.terms}
-        left_out = frozenset(term.word for term in here) - words
+        left_out = frozenset({*ROBOT_WORDS, PARAMETER}) - words
+        here = all_terms(laid, left_out)
         ahead = [
             _ahead(
                 Contest(_lacking(laid, _predicted(fit, here, laid), made), left_out), fit, own, rival, doubt.beside

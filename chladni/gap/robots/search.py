@@ -10,6 +10,8 @@ from chladni.gap.robots.term import Term
 _FITTED = 8
 #: The same in place of another.
 _EXCHANGED = 3
+#: Nats by which what is exchanged may promise less: details and prices aren't in a promise.
+_BEHIND = 20.0
 #: Nats that a move has to bring.
 _WORTH = 1.0
 _MOST = 60
@@ -62,7 +64,8 @@ def _shared(others: Sequence[Term]) -> Iterable[list[Term]]:
 def _tidied(contest: Contest, best: Fit) -> Fit:
     """Drop terms, and exchange each for another where it acts, while that helps."""
     while True:
-        found = [one for place in range(len(best.terms)) for one in alternatives(contest, best, place, _EXCHANGED)]
+        places = range(len(best.terms))
+        found = [one for place in places for one in alternatives(contest, best, place, _EXCHANGED, _BEHIND)]
         better = _best([best, *found, *_merged(contest, best)])
         if better is best:
             return best
@@ -80,14 +83,23 @@ def _merged(contest: Contest, best: Fit) -> list[Fit]:
     return found
 
 
-def alternatives(contest: Contest, best: Fit, place: int, count: int) -> list[Fit]:
-    """Fit what could stand in place of a term: nothing, or another term that promises as much."""
+def alternatives(contest: Contest, best: Fit, place: int, count: int, behind: float = float("inf")) -> list[Fit]:
+    """Fit what could stand in place of a term: nothing, or another term that promises as much.
+
+    Parameters
+    ----------
+    count
+        Terms that are fitted at most.
+    behind
+        Nats by which they may promise less than the one that stands there.
+    """
     rest = [*best.terms[:place], *best.terms[place + 1 :]]
-    taken = {one.key for one in rest}
+    taken, own = {one.key for one in rest}, best.terms[place]
     without = contest.fit(rest, best)
-    others = [term for _, term in contest.promise(without) if term.key not in taken and term is not best.terms[place]]
-    found = [contest.fit([*rest, term], best) for term in others[:count]]
-    return [without, *found]
+    promised = contest.promise(without)
+    least = next(nats for nats, term in promised if term is own) - behind
+    others = [term for nats, term in promised if term.key not in taken and term is not own and nats > least]
+    return [without, *(contest.fit([*rest, term], best) for term in others[:count])]
 
 
 def _best(fits: Sequence[Fit]) -> Fit:

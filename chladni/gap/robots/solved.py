@@ -25,8 +25,6 @@ _SHIFTS, _SETTLED_S, _SETTLED_M = 5, 1e-4, 2e-3
 _TOLD_BY = 2.0
 #: Times that gains which nobody says are guessed anew, until they move by less.
 _GUESSES, _SETTLED_GAIN = 2, 0.05
-#: A drive gives at most ten times what it's asked for.
-_LEAST_OVER = 0.1
 #: Of a form: by how little it moves when it has settled.
 _SETTLED = 0.01
 
@@ -83,26 +81,26 @@ class Solved:
     def gains(self) -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:
         """Give kp and kd of loops whose gains are in doubt, each with its standard deviation."""
         torques, best, tolerated = self.torques, self.best, self.contest.tolerated
-        deviations, found = np.sqrt(np.diag(best.covariance)), {}
+        within = dict(zip(tolerated, best.numbers.tolist(), strict=False))
+        spread, found = dict(zip(tolerated, np.sqrt(np.diag(best.covariance)).tolist(), strict=False)), {}
         for row, joint in torques.rows:
-            if f"{joint.name}.kp" not in tolerated:
-                continue
-            kp, kd = (tolerated.index(f"{joint.name}.{which}") for which in ("kp", "kd"))
-            doubts = torques.gain_doubts(row)
-            over = max(1.0 + doubts[0] * float(best.numbers[kp]), _LEAST_OVER)
-            stiffness = float(torques.kp[row]) / over
-            damping = float(torques.kd[row]) * (1.0 + doubts[1] * float(best.numbers[kd]) / over)
-            spread = float(torques.kd[row]) * doubts[1] * float(deviations[kd]) / over
-            found[joint.name] = (
-                (stiffness, stiffness * doubts[0] * float(deviations[kp]) / over), (max(damping, 0.0), spread)
-            )  # fmt: skip
+            names = f"{joint.name}.kp", f"{joint.name}.kd"
+            if names[0] in within:
+                doubts = torques.gain_doubts(row)
+                kp, kd = torques.gains(row, (within[names[0]], within[names[1]]))
+                over = float(torques.kp[row]) / kp
+                found[joint.name] = (
+                    (kp, kp * doubts[0] * spread[names[0]] / over),
+                    (max(kd, 0.0), float(torques.kd[row]) * doubts[1] * spread[names[1]] / over),
+                )
         return found
 
     def _gain(self, term: Term) -> float:
         """Of the drive that a law was found at: its numbers are in units of what was asked."""
         sites = {self.torques.joints[row].name for row in term.rows}
         for place, other in enumerate(self.best.terms):
-            if other.site in sites and other.word in ("gain_error", "controller_gain"):
+            scales = other.word in ("gain_error", "controller_gain") and self.torques.in_asked(other.word)
+            if other.site in sites and scales:
                 return 1.0 / float(self.best.values(place)[0][0])
         return 1.0
 

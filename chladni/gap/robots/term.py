@@ -91,6 +91,10 @@ class Term:
         Of the joints whose law this idealises; none where the physics is exact.
     form
         The number that its columns aren't linear in, if there's one.
+    plainer
+        The word of the law that is left without the last number; None where none is.
+    takes
+        Whether its first column is torque that a drive was asked for and doesn't give.
     rare
         Whether few machines have it.
     reach
@@ -105,6 +109,8 @@ class Term:
     variant: str | None = None
     form: Form | None = None
     reach: float | None = None
+    plainer: str | None = None
+    takes: bool = False
     rare: bool = False
 
     @property
@@ -189,10 +195,10 @@ def length(joint: RobotJoint) -> str:
 
 def law(
     torques: Torques, row: int, word: str, columns: tuple[Real, ...], *numbers: Number, variant: str | None = None,
-    rare: bool = False,
+    rare: bool = False, plainer: str | None = None,
 ) -> Term:  # fmt: skip
     """Give a law of one joint."""
     return Term(
         word=word, site=torques.joints[row].name, columns=at_row(torques, row, *columns), numbers=numbers,
-        rows=(row,), variant=variant, rare=rare,
+        rows=(row,), variant=variant, rare=rare, plainer=plainer,
     )  # fmt: skip

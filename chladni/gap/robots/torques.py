@@ -41,6 +41,8 @@ _ORDER = 4
 _LINES, _CLEAR = 64, 0.02
 #: By how much a joint is turned to tell what that changes, rad (m), RMS.
 _TURN = 1e-4
+#: One over a gain, at least: a drive gives at most ten times what it's asked for.
+LEAST_OVER = 0.1
 #: Of a gain that nobody says, over what was guessed.
 _UNKNOWN_GAIN = 0.5
 #: Values from means over cells, of fourth order: 1 - d^2/24 + 3 d^4/640.
@@ -536,6 +538,11 @@ class Torques:
         return self.smooth(self._limited(np.nan_to_num(self._served))) if self.two_sided else self.drive
 
     @cached_property
+    def asked_of(self) -> Real:
+        """``[row, coarse]``: torque that is asked for at each row."""
+        return np.concatenate([self.drive, self.asked]) if self.two_sided else self.drive
+
+    @cached_property
     def answered(self) -> Real:
         """``[joint, coarse]``: what the loops' torque is held against."""
         return self.drive if self.two_sided else self.wanted
@@ -693,6 +700,27 @@ class Torques:
         # As much as a usual torque at a usual speed.
         usual = float(np.std(self.drive[row])) / rms(self.velocity[row])
         return _UNKNOWN_GAIN, usual / max(float(self.kd[row]), 1e-12)
+
+    def in_asked(self, word: str) -> bool:
+        """Whether a joint's laws are in units of what its drive was asked for where this word was found there."""
+        return not (self.gives if word == "gain_error" else self.two_sided)
+
+    def gains(
+        self, row: int, within: tuple[float, float], over_kp: float = 1.0, kd_over_kp: float = 0.0
+    ) -> tuple[float, float]:
+        """Give kp and kd of a joint's loop.
+
+        Parameters
+        ----------
+        within
+            Numbers of their doubts.
+        over_kp, kd_over_kp
+            What was found beside them, see `controller_gain`.
+        """
+        doubts = self.gain_doubts(row)
+        over = max(over_kp + doubts[0] * within[0], LEAST_OVER)
+        aside = kd_over_kp + doubts[1] * within[1]
+        return float(self.kp[row]) / over, float(self.kd[row]) * (1.0 + aside / over)
 
     @cached_property
     def moves(self) -> Mask:

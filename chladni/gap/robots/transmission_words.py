@@ -104,6 +104,7 @@ def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
             numbers=(part, rotor),
             rows=rows,
             variant=AT_LINK,
+            takes=True,
             rare=True,
         )
 

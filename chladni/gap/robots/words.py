@@ -1,8 +1,9 @@
 """All words for robots at all sites."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
+from chladni.gap.records.diagnosis import PARAMETER
 from chladni.gap.robots.body_words import bodies, payloads, readings
 from chladni.gap.robots.drive_words import delays, drives
 from chladni.gap.robots.joint_words import coupled, friction, inertia, ripple, springs
@@ -11,18 +12,42 @@ from chladni.gap.robots.torques import FormKey, Torques
 from chladni.gap.robots.transmission_words import transmissions
 
 Maker = Callable[[Torques], Iterator[Term]]
-#: Words whose columns stay as they are, and those that are made anew for what was found.
-_LASTING: tuple[Maker, ...] = (friction, coupled, springs, inertia, transmissions, drives, bodies)
-_MADE_ANEW: tuple[Maker, ...] = (readings, payloads, delays, ripple)
+#: What makes which words: columns that stay as they are, and those that are made anew for what was found.
+_LASTING: Mapping[Maker, tuple[str, ...]] = {
+    friction: ("coulomb_friction", "viscous_friction", "quadratic_damping", "load_friction", "stribeck_friction",
+               "hysteresis"),
+    coupled: ("coulomb_friction", "viscous_friction"),
+    springs: ("joint_spring", "one_sided_stop"),
+    inertia: ("armature",),
+    transmissions: ("joint_elasticity", "backlash"),
+    drives: ("gain_error", "saturation", "dead_zone", "lag", "rate_limit", "controller_gain"),
+    bodies: ("gravity_tilt", "misalignment", PARAMETER),
+}  # fmt: skip
+_MADE_ANEW: Mapping[Maker, tuple[str, ...]] = {
+    readings: ("encoder_offset",),
+    payloads: ("payload",),
+    delays: ("delay",),
+    ripple: ("ripple",),
+}
+#: Words of robots beside those of effects.md.
+ROBOT_WORDS = tuple(
+    sorted({word for made in (_LASTING, _MADE_ANEW) for words in made.values() for word in words} - {PARAMETER})
+)
 
 
-def all_terms(torques: Torques) -> list[Term]:
-    """Give every word at every site of a robot, and laws with the forms that were found."""
-    if "terms" not in torques.memory:
-        torques.memory["terms"] = [term for make in _LASTING for term in make(torques)]
-    terms = [*torques.memory["terms"], *(term for make in _MADE_ANEW for term in make(torques))]
-    found = [_found(terms, key, value) for key, value in torques.guesses.forms.items()]
+def all_terms(torques: Torques, left_out: frozenset[str] = frozenset()) -> list[Term]:
+    """Give the words that take part at every site of a robot, and laws with the forms that were found."""
+    key = f"terms without {sorted(left_out)}"
+    if key not in torques.memory:
+        torques.memory[key] = _made(_LASTING, torques, left_out)
+    terms = [*torques.memory[key], *_made(_MADE_ANEW, torques, left_out)]
+    found = [_found(terms, form, value) for form, value in torques.guesses.forms.items()]
     return [*terms, *(one for one in found if one is not None)]
+
+
+def _made(makers: Mapping[Maker, tuple[str, ...]], torques: Torques, left_out: frozenset[str]) -> list[Term]:
+    takes_part = [make for make, words in makers.items() if not left_out.issuperset(words)]
+    return [term for make in takes_part for term in make(torques) if term.word not in left_out]
 
 
 def _found(terms: list[Term], key: FormKey, value: float) -> Term | None:

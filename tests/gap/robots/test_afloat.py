@@ -8,10 +8,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from chladni.gap.records.diagnosis import Diagnosis
-from chladni.gap.robots.diagnose import ROBOT_WORDS, diagnose_robot
+from chladni.gap.robots.diagnose import diagnose_robot
 from chladni.gap.robots.forward import simulated
 from chladni.gap.robots.torques import torques_of
-from chladni.gap.robots.words import all_terms
+from chladni.gap.robots.words import ROBOT_WORDS, all_terms
 from chladni.robots.joint_log import JointLog
 from chladni.robots.machine import as_described
 from chladni.signals.errors import LogError

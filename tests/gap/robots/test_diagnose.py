@@ -8,9 +8,9 @@ import pytest
 
 import chladni
 from chladni.gap.records.diagnosis import Diagnosis
-from chladni.gap.robots.diagnose import ROBOT_WORDS, diagnose_robot
+from chladni.gap.robots.diagnose import diagnose_robot
 from chladni.gap.robots.torques import torques_of
-from chladni.gap.robots.words import all_terms
+from chladni.gap.robots.words import ROBOT_WORDS, all_terms
 from chladni.robots.robot import Robot
 from chladni.signals.errors import LogError, ModelError, SetupError
 from tests.robots.machines import RATE_HZ, arm, commands, joint_log_of, run_native
