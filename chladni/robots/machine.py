@@ -33,6 +33,20 @@ class Loop:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Uneven:
+    """Friction beyond the constant part, linear between places.
+
+    Attributes
+    ----------
+    places, beyond
+        rad (m), rising; N m (N) at each.
+    """
+
+    places: tuple[float, ...]
+    beyond: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Ripple:
     """Torque that resists by ``sine sin(2 pi q / period) + cosine cos(2 pi q / period)``; N m (N), rad (m)."""
 
@@ -101,7 +115,7 @@ class MachineJoint:
         By which commands arrive late.
     dead, rate
         Torque below which the drive gives none, N m (N), and speed that its reference doesn't exceed, rad/s (m/s).
-    loop, ripple, stops, transmission
+    loop, uneven, ripple, stops, transmission
         Further laws; None and empty without.
     reading, drive_reading
         What the log reads, and what the drive reads beyond the log, minus the truth; rad (m).
@@ -124,6 +138,7 @@ class MachineJoint:
     dead: float = 0.0
     rate: float = np.inf
     loop: Loop | None = None
+    uneven: Uneven | None = None
     ripple: Ripple | None = None
     stops: tuple[Stop, ...] = ()
     transmission: Transmission | None = None
@@ -132,11 +147,12 @@ class MachineJoint:
 
     def with_share(self, share: float) -> MachineJoint:
         """Give the same with laws that were found in units of torque that was asked, where a share of it arrives."""
-        loop, wave = self.loop, self.ripple
+        loop, wave, way = self.loop, self.ripple, self.uneven
         return replace(
             self, rise=share * self.rise, quadratic=share * self.quadratic, load=share * self.load,
             stiffness=share * self.stiffness, torque=share * self.torque,
             loop=None if loop is None else replace(loop, force=share * loop.force),
+            uneven=None if way is None else replace(way, beyond=tuple(share * one for one in way.beyond)),
             ripple=None if wave is None else replace(wave, sine=share * wave.sine, cosine=share * wave.cosine),
             stops=tuple(replace(one, stiffness=share * one.stiffness) for one in self.stops),
         )  # fmt: skip

@@ -234,14 +234,18 @@ class _Run:
 
     def _friction_laws(self) -> list[Step]:
         load, rise = self._row("load"), self._row("rise")
-        if not load.any() and not rise.any():
+        uneven = [(row, one.uneven) for row, one in enumerate(self._joints) if one.uneven is not None]
+        if not load.any() and not rise.any() and not uneven:
             return []
         model, data, dofs = self._model, self._data, self._dofs
         friction, fading, kd = self._row("friction"), self._row("fading"), self._implicit
 
-        def law(_: Real, speed: Real) -> None:
+        def law(position: Real, speed: Real) -> None:
             carried = np.abs(data.qfrc_applied[dofs] + data.qfrc_constraint[dofs] - kd * speed)
-            model.dof_frictionloss[dofs] = friction + load * carried + rise * np.exp(-((speed / fading) ** 2))
+            found = friction + load * carried + rise * np.exp(-((speed / fading) ** 2))
+            for row, one in uneven:
+                found[row] += np.interp(position[row], one.places, one.beyond)
+            model.dof_frictionloss[dofs] = np.maximum(found, 0.0)
 
         return [law]
 

@@ -175,6 +175,10 @@ def _not_held(one: MachineJoint) -> Iterator[str]:
         yield f"{name}: friction of {one.load:.4g} of the load; {one.friction:.4g} {force} are held"
     if one.rise:
         yield f"{name}: Stribeck friction, {one.rise:.4g} {force} more when slower than {one.fading:.3g} {angle}/s"
+    if one.uneven is not None:
+        at = ", ".join(f"{one.friction + each:.4g} {force} at {place:.4g} {angle}" for place, each in
+                       zip(one.uneven.places, one.uneven.beyond, strict=True))  # fmt: skip
+        yield f"{name}: friction that changes along its way, {at}; {one.friction:.4g} {force} are held"
     if one.loop is not None:
         yield f"{name}: friction of {one.loop.force:.4g} {force} that builds up over {one.loop.yields:.3g} {angle}"
     if one.ripple is not None:

@@ -180,10 +180,18 @@ _FRICTION: Mapping[str, tuple[str, tuple[str, ...]]] = {
 }
 
 
+#: What is said of Coulomb friction that changes along a joint's way.
+_UNEVEN = ("Coulomb {} midway, {} at its lowest and {} at its highest position", ("force", "at_lowest", "at_highest"))
+
+
+def _friction(cause: Cause) -> tuple[str, tuple[str, ...]]:
+    return _UNEVEN if "at_lowest" in cause.parameters else _FRICTION[cause.effect]
+
+
 def _rubs(causes: Sequence[Cause]) -> Told:
     ordered = sorted(causes, key=lambda one: list(_FRICTION).index(one.effect))
-    texts = [_FRICTION[one.effect][0] for one in ordered]
-    numbers = [one.parameters[name] for one in ordered for name in _FRICTION[one.effect][1]]
+    texts = [_friction(one)[0] for one in ordered]
+    numbers = [one.parameters[name] for one in ordered for name in _friction(one)[1]]
     return Told(verbs=("rubs", "rub"), text=f": {', '.join(texts)}", numbers=tuple(numbers))
 
 

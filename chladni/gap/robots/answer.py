@@ -329,18 +329,15 @@ def _tuned_gains(solved: Solved) -> dict[str, FittedNumber]:
 
 
 def _tuned_masses(solved: Solved) -> dict[str, FittedNumber]:
-    contest, best, robot = solved.contest, solved.best, solved.torques.robot
-    numbers, found = inertial_numbers(robot), {}
-    deviations = np.sqrt(np.diag(best.covariance))
-    for place, name in enumerate(contest.tolerated):
+    robot, numbers, found = solved.torques.robot, inertial_numbers(solved.torques.robot), {}
+    for name, (value, std) in solved.contest.tolerances(solved.best).items():
         link, _, what = name.rpartition(".")
         if what != "mass":
             continue
         mass = float(numbers[robot.links.index(link), 0])
         spread = robot.tolerance.inertia * mass
-        std = float(deviations[place])
         found[name] = FittedNumber(
-            value=mass + spread * float(best.numbers[place]), unit="kg", nominal=mass,
+            value=mass + spread * value, unit="kg", nominal=mass,
             # What a log doesn't narrow down stays as wide as its tolerance.
             std=spread * std if std < _NARROWED else None,
         )  # fmt: skip

@@ -8,6 +8,7 @@ from functools import cached_property
 from math import comb, log, log1p
 
 import numpy as np
+from scipy.optimize import nnls
 
 from chladni.gap.calibration import ANOTHER, DETAILS, ELSEWHERE, QUARTER, USUAL
 from chladni.gap.records.diagnosis import PARAMETER
@@ -19,6 +20,8 @@ from chladni.signals.arrays import Index, Mask, Real
 
 #: Share by which the noise of a torque is known.
 _DOUBT = 0.3
+#: Information over the prior's: what a log tells less of stays where it's believed.
+_UNTOLD = 1e-3
 _ROUNDS, _NEAR = 8, 3
 
 
@@ -87,7 +90,8 @@ class Fit:
     terms
         The set.
     numbers, covariance
-        ``[number]`` of the tolerances first, then of the terms, over their scales; and their covariance.
+        ``[number]`` of the tolerances first, which `Contest.tolerances` reads, then of the terms, over their scales;
+        and their covariance.
     left
         ``[joint]``: what is left at each.
     nats
@@ -128,15 +132,13 @@ class Contest:
     ) -> None:
         self.torques = torques
         self.terms = all_terms(torques, left_out)
-        inside, self.tolerated = tolerances(torques)
-        self.within = len(inside)
-        blocks = [
-            self._padded(inside),
-            *(self._padded(term.columns) * term.scale[:, None, None] for term in self.terms),
-        ]
         there = torques.moving if taking_part is None else torques.moving & taking_part
-        self._blocks = np.concatenate(blocks)
         self._whiten = np.sqrt(torques.numbers_a_sample) * there / torques.noise[:, None]
+        inside, self._tolerated = tolerances(torques)
+        self._told = _told(inside * self._whiten)
+        self.within = len(self._told)
+        columns = (self._padded(term.columns) * term.scale[:, None, None] for term in self.terms)
+        self._blocks = np.concatenate([np.tensordot(self._told, inside, 1), *columns])
         self.count = torques.numbers_a_sample * np.sum(there, axis=1)
         self._there = np.any(self._blocks, axis=2)
         self._gram, self._right = self._moments(self._blocks, self._there, self._blocks, self._there)
@@ -148,8 +150,8 @@ class Contest:
         }
         bounds = [term.least / term.scale for term in self.terms]
         self._least = np.concatenate([np.full(self.within, -np.inf), *bounds])
-        kinds = {term.key: term for term in self.terms}
-        self._words, self._every = Counter(term.word for term in kinds.values()), log(max(len(kinds), 1))
+        kinds = {(term.key, term.rare): term for term in self.terms}
+        self._words, self._every = Counter((term.word, term.rare) for term in kinds.values()), log(max(len(kinds), 1))
         # What tolerances alone leave.
         self._before = self._energy
         self.nothing = self.fit(())
@@ -233,7 +235,7 @@ class Contest:
             for first, last, share in arms:
                 least[first] = max(share * float(np.linalg.norm(numbers[first + 1 : last])), 0.0)
                 numbers[first] = max(numbers[first], least[first])
-            left = self._left(gram, right, numbers, laws, self._passing(terms, numbers))
+            left = self._left(gram, right, numbers, laws, self._passing(terms, numbers), self._units(terms, numbers))
             weight = np.array([one.weight for one in left])
         curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
         covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
@@ -243,6 +245,13 @@ class Contest:
             terms=tuple(terms), numbers=numbers, covariance=covariance, left=left, within=self.within,
             nats=known + size + self.prior(terms), weight=weight,
         )  # fmt: skip
+
+    def tolerances(self, fit: Fit) -> dict[str, tuple[float, float]]:
+        """Give what a fit says of numbers in their tolerances: value and standard deviation, over the tolerance."""
+        values = fit.numbers[: self.within] @ self._told
+        narrowed = np.eye(self.within) - fit.covariance[: self.within, : self.within]
+        deviations = np.sqrt(np.maximum(1.0 - np.einsum("pn,pq,qn->n", self._told, narrowed, self._told), 0.0))
+        return dict(zip(self._tolerated, zip(values.tolist(), deviations.tolist(), strict=True), strict=True))
 
     def again(self, fit: Fit) -> Fit:
         """Fit a set of another contest, of the same words at the same sites."""
@@ -258,7 +267,7 @@ class Contest:
         """Nats of a set: each a cause of its own, or a word at several sites, as far as that is less."""
         nats = 0.0
         every = self._every
-        for word, count in Counter(term.word for term in terms).items():
+        for word, count in Counter((term.word, term.rare) for term in terms).items():
             alone = (log(ANOTHER) - every) * (count - 1)
             shared = log(ANOTHER) - log(comb(self._words[word], count)) if count > 1 else -np.inf
             nats += log(ANOTHER) - every + max(alone, shared)
@@ -312,10 +321,24 @@ class Contest:
             found[row] = min(passing / QUARTER, 1.0) + 1e-6
         return found
 
+    def _units(self, terms: Sequence[Term], numbers: Real) -> Real:
+        """Give ``[row]``: how many units of what was asked for one of the machine's torque is, squared, one at most.
+
+        What a law leaves beyond noise is the machine's: a gain doesn't make it small.
+        """
+        found, place = np.ones(len(self._energy)), self.within
+        for term in terms:
+            if term.over_gain:
+                over = float(term.nominal[0] + numbers[place] * term.scale[0])
+                found[self._there[self._places[id(term)][0]]] *= min(over, 1.0) ** 2
+            place += len(term.numbers)
+        return found
+
     def _left(
-        self, gram: Real, right: Real, numbers: Real, laws: Sequence[Index], passing: Real
+        self, gram: Real, right: Real, numbers: Real, laws: Sequence[Index], passing: Real, units: Real
     ) -> tuple[JointLeft, ...]:
         energy = (self._energy - 2.0 * right @ numbers + (gram @ numbers) @ numbers) / passing
+        energy += np.maximum(energy - self.count, 0.0) * (1.0 / units - 1.0)
         found = []
         for row, places in enumerate(laws):
             own = numbers[places] @ gram[row][np.ix_(places, places)] @ numbers[places]
@@ -401,14 +424,28 @@ class Contest:
         return np.array([replace(one, force=np.inf).log_likelihood - one.log_likelihood + alone for one in fit.left])
 
 
+def _told(whitened: Real) -> Real:
+    """``[told, tolerance]``: combinations of tolerances that a log tells of, orthogonal, of one deviation each."""
+    flat = whitened.reshape(len(whitened), -1)
+    information, combinations = np.linalg.eigh(flat @ flat.T)
+    return np.asarray(combinations[:, information > _UNTOLD].T)
+
+
 def _bounded(curvature: Real, right: Real, least: Real) -> Real:
-    """Solve for numbers of which some have a lower bound: those that would lie below are held at it, in turn."""
+    """Solve for numbers of which some have a lower bound, by nonnegative least squares (Lawson & Hanson 1974)."""
     numbers = np.linalg.solve(curvature, right)
-    held = numbers < least
-    while np.any(numbers < least - 1e-12):
-        held |= numbers < least
-        free = ~held
-        numbers = np.where(held, least, 0.0)
-        rest = right[free] - curvature[np.ix_(free, held)] @ least[held]
-        numbers[free] = np.linalg.solve(curvature[np.ix_(free, free)], rest)
+    if np.all(numbers >= least):
+        return np.asarray(numbers)
+    bound = np.isfinite(least)
+    free = ~bound
+    # What the others make of the bounded ones is eliminated.
+    across = np.linalg.solve(
+        curvature[np.ix_(free, free)], np.column_stack([curvature[np.ix_(free, bound)], right[free]])
+    )
+    own = curvature[np.ix_(bound, bound)] - curvature[np.ix_(bound, free)] @ across[:, :-1]
+    wanted = right[bound] - curvature[np.ix_(bound, free)] @ across[:, -1] - own @ least[bound]
+    lower = np.linalg.cholesky(own)
+    above, _ = nnls(lower.T, np.linalg.solve(lower, wanted))
+    numbers[bound] = least[bound] + above
+    numbers[free] = across[:, -1] - across[:, :-1] @ numbers[bound]
     return np.asarray(numbers)

@@ -28,7 +28,7 @@ def drives(torques: Torques) -> Iterator[Term]:
         columns = at_row(
             torques, _limited(torques, row), (torques.answered if torques.gives else torques.wanted)[row]
         )
-        yield Term(word="gain_error", site=joint.name, columns=columns, numbers=(over,))
+        yield Term(word="gain_error", site=joint.name, columns=columns, numbers=(over,), over_gain=True)
         if not torques.by_effort or torques.gives or torques.log.effort_kind != "measured":
             yield from _saturation(torques, row, joint)
             yield from _dead_zone(torques, row, joint)
@@ -120,6 +120,7 @@ def _gains(torques: Torques) -> Iterator[Term]:
                 Number(name="over_kp", unit="1", scale=_GAIN, least=LEAST_OVER - 1.0, nominal=1.0),
                 Number(name="kd_over_kp", unit="1", scale=_GAIN),
             ),
+            over_gain=True,
         )  # fmt: skip
 
 
@@ -143,4 +144,5 @@ def delays(torques: Torques) -> Iterator[Term]:
             found = torques.guesses.late_s.get(joint.name, 0.0)
             alone = torques.late(common, found)[row] if secant_s is None and found else late[row]
             columns = at_row(torques, torques.servo_row(row), alone)
-            yield Term(word="delay", site=joint.name, columns=columns, numbers=(own,), variant=variant)
+            # One line carries the commands of all.
+            yield Term(word="delay", site=joint.name, columns=columns, numbers=(own,), variant=variant, rare=True)

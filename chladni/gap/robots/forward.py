@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.joint_words import ALONG_THE_WAY, way_of
 from chladni.gap.robots.solved import Solved
 from chladni.gap.robots.term import SENSES, Term
 from chladni.gap.robots.tolerances import INERTIAL_NAMES, LOOP_S, tolerated_inertia
@@ -21,6 +22,7 @@ from chladni.robots.machine import (
     Ripple,
     Stop,
     Transmission,
+    Uneven,
     as_described,
     physical,
 )
@@ -104,8 +106,8 @@ class _Reading:
         self._joints = dict(self._described)
         self._terms = [(term, fit.values(place)[0]) for place, term in enumerate(fit.terms)]
         # What stands farther aside is no tolerance any more.
-        within = np.clip(fit.numbers[: fit.within], -_INSIDE, _INSIDE)
-        self._within = dict(zip(contest.tolerated, within.tolist(), strict=True))
+        within = contest.tolerances(fit)
+        self._within = {name: float(np.clip(value, -_INSIDE, _INSIDE)) for name, (value, _) in within.items()}
 
     def machine(self) -> Machine:
         for name in self._torques.log.joints:
@@ -210,6 +212,15 @@ def _point(values: Real) -> Real:
 Law = Callable[[MachineJoint, Term, Real, Torques], MachineJoint]
 
 
+def _coulomb(one: MachineJoint, term: Term, values: Real, torques: Torques) -> MachineJoint:
+    midway = float(values[0])
+    if term.variant != ALONG_THE_WAY:
+        return replace(one, friction=midway)
+    places = way_of(torques, torques.log.joints.index(term.site))
+    beyond = (float(values[1]) - midway, 0.0, float(values[2]) - midway)
+    return replace(one, friction=midway, uneven=Uneven(places=places, beyond=beyond))
+
+
 def _stribeck(one: MachineJoint, term: Term, values: Real, _: Torques) -> MachineJoint:
     return replace(one, friction=float(values[0]), rise=float(values[1]), fading=term.form_value)
 
@@ -259,7 +270,7 @@ def _offset(one: MachineJoint, term: Term, values: Real, _torques: Torques) -> M
 
 
 _LAWS: Mapping[str, Law] = {
-    "coulomb_friction": lambda one, _term, values, _: replace(one, friction=float(values[0])),
+    "coulomb_friction": _coulomb,
     "viscous_friction": lambda one, _term, values, _: replace(one, damping=float(values[0])),
     "quadratic_damping": lambda one, _term, values, _: replace(one, quadratic=float(values[0])),
     "load_friction": lambda one, _term, values, _: replace(one, friction=float(values[0]), load=float(values[1])),

@@ -1,6 +1,7 @@
 """Words of what acts at joints: friction, loops, springs, stops, ripple, rotors."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -15,6 +16,8 @@ from chladni.signals.arrays import Real
 _STRIBECK = (0.05, 0.15, 0.4)
 #: Of a joint's motion: over which friction of either way builds up. A joint that yields less slides.
 _SLIDES, _YIELDS = (0.01, 0.03, 0.08), (0.16, 0.32, 0.64)
+#: Variant of friction.
+ALONG_THE_WAY = "along the way"
 #: Quantiles of a joint's way at which a stop begins.
 _STOPS = (0.6, 0.75, 0.85, 0.93)
 #: Friction that grows with the load, before a log is seen.
@@ -45,8 +48,28 @@ def friction(torques: Torques) -> Iterator[Term]:
         carried = np.abs(torques.of_joints(torques.need.torque)[row]) * sign
         by_load = Number(name="coefficient", unit="1", scale=_BY_LOAD, least=0.0)
         yield one("load_friction", (sign, carried), dry, by_load, plainer="coulomb_friction")
+        yield _uneven(torques, row, dry)
         yield from _stribeck(torques, row, joint, dry)
         yield from _loops(torques, row, joint, dry)
+
+
+def _uneven(torques: Torques, row: int, dry: Number) -> Term:
+    """Friction that changes along a joint's way, as that of knees behind linkages: by places it's linear between."""
+    fast, places = torques.fast_position[row], way_of(torques, row)
+    midway, lowest, highest = (
+        torques.smooth(torques.fast_sign[row] * np.interp(fast, places, there))
+        for there in np.eye(len(places))[[1, 0, 2]]
+    )
+    return law(
+        torques, row, "coulomb_friction", (midway, lowest, highest), dry, replace(dry, name="at_lowest"),
+        replace(dry, name="at_highest"), variant=ALONG_THE_WAY, rare=True,
+    )  # fmt: skip
+
+
+def way_of(torques: Torques, row: int) -> tuple[float, float, float]:
+    """Lowest, middle and highest position that a log holds of a joint."""
+    lowest, highest = float(np.min(torques.position[row])), float(np.max(torques.position[row]))
+    return lowest, 0.5 * (lowest + highest), highest
 
 
 def _stribeck(torques: Torques, row: int, joint: RobotJoint, dry: Number) -> list[Term]:

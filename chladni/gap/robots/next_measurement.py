@@ -282,9 +282,11 @@ def _ahead(then: Contest, truth: Fit, own: Term, rival: Term | None, beside: Bes
     rest = [_like(then.terms, one) for one in truth.terms if one is not own]
     both = [own] if rival is None else [own, rival]
     words, keys = {one.word for one in both}, {one.key for one in (*truth.terms, *both)}
-    others = [[*rest, one] for one in then.terms if one.word in words and one.key not in keys | beside]
-    instead = rest if rival is None else [*rest, _like(then.terms, rival)]
     best = then.fit([*rest, _like(then.terms, own)])
+    without = then.fit(rest, best)
+    promised = [one for _, one in then.promise(without) if one.word in words and one.key not in keys | beside]
+    instead = rest if rival is None else [*rest, _like(then.terms, rival)]
+    others = [[*rest, one] for one in promised[:_RIVALS]]
     return best.nats - max(then.fit(one, best).nats for one in (instead, *others))
 
 

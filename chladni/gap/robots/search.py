@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
+from chladni.gap.calibration import SAME
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.term import Term
 
@@ -20,8 +21,22 @@ _MOST = 60
 def searched(
     contest: Contest, begin: Fit | None = None, *, progress: Callable[[float], None] = lambda _: None
 ) -> Fit:
-    """Give the most probable set that moves lead to, from nothing or from another set."""
-    best = contest.nothing if begin is None else _tidied(contest, begin)
+    """Give the most probable set that moves lead to, from nothing or from another set.
+
+    Where more than noise is left, moves begin once more from what is found without drives that give more or less than
+    they're asked for: those explain a part of anything.
+    """
+    if begin is not None:
+        return _moved(contest, _tidied(contest, begin), progress)
+    best = _moved(contest, contest.nothing, progress)
+    if all(one.over_noise < SAME for one in best.left):
+        return best
+    as_asked = contest.narrowed([one for one in contest.terms if not (one.over_gain or one.takes)])
+    other = contest.fit(_moved(as_asked, as_asked.nothing, progress).terms)
+    return _best([best, _moved(contest, _tidied(contest, other), progress)])
+
+
+def _moved(contest: Contest, best: Fit, progress: Callable[[float], None]) -> Fit:
     for move in range(_MOST):
         better = _tidied(contest, _best([best, *_more(contest, best)]))
         if better.nats < best.nats + _WORTH:
@@ -66,7 +81,7 @@ def _tidied(contest: Contest, best: Fit) -> Fit:
     while True:
         places = range(len(best.terms))
         found = [one for place in places for one in alternatives(contest, best, place, _EXCHANGED, _BEHIND)]
-        better = _best([best, *found, *_merged(contest, best)])
+        better = _best([best, *found, *_merged(contest, best), *_exchanged(contest, best)])
         if better is best:
             return best
         best = better
@@ -80,6 +95,27 @@ def _merged(contest: Contest, best: Fit) -> list[Fit]:
             rest = contest.fit([term for term in best.terms if term.site != site], best)
             near = [term for _, term in contest.promise(rest) if term.site == site]
             found += [contest.fit([*rest.terms, term], rest) for term in near[:_EXCHANGED]]
+    return found
+
+
+def _exchanged(contest: Contest, best: Fit) -> list[Fit]:
+    """Fit another word at all sites of one that several have, as they're made alike; or one term in place of all."""
+    found = []
+    for kind, count in Counter((term.word, term.rare) for term in best.terms).items():
+        if count == 1:
+            continue
+        sites = {term.site for term in best.terms if (term.word, term.rare) == kind}
+        rest = contest.fit([term for term in best.terms if (term.word, term.rare) != kind], best)
+        taken = {term.key for term in rest.terms}
+        others = [one for one in contest.promise(rest) if one[1].key not in taken]
+        alike: dict[tuple[str, str | None, int], list[tuple[float, Term]]] = {}
+        for nats, term in others:
+            if term.site in sites and term.word != kind[0]:
+                alike.setdefault(term.kind, []).append((nats, term))
+        families = [one for one in alike.values() if len(one) == len(sites)]
+        families.sort(key=lambda one: -sum(nats for nats, _ in one))
+        found += [rest, *(contest.fit([*rest.terms, term], best) for _, term in others[:_EXCHANGED])]
+        found += [contest.fit([*rest.terms, *(term for _, term in one)], best) for one in families[:_EXCHANGED]]
     return found
 
 

@@ -61,7 +61,7 @@ class Solved:
         values, deviations = self.best.values(place)
         if (term.word, term.site) == ("delay", ALL_COMMANDS):
             # Where commands wait for the loop's turn, too, is the whole delay.
-            turn = LOOP_S * float(self.best.numbers[self.contest.tolerated.index("turn")])
+            turn = LOOP_S * self.contest.tolerances(self.best)["turn"][0]
             found = {"delay": (float(values[0]) + turn, float(deviations[0]), "s")}
         elif term.word in TOLD:
             found = TOLD[term.word](term, values, deviations)
@@ -80,18 +80,17 @@ class Solved:
 
     def gains(self) -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:
         """Give kp and kd of loops whose gains are in doubt, each with its standard deviation."""
-        torques, best, tolerated = self.torques, self.best, self.contest.tolerated
-        within = dict(zip(tolerated, best.numbers.tolist(), strict=False))
-        spread, found = dict(zip(tolerated, np.sqrt(np.diag(best.covariance)).tolist(), strict=False)), {}
+        torques, within, found = self.torques, self.contest.tolerances(self.best), {}
         for row, joint in torques.rows:
             names = f"{joint.name}.kp", f"{joint.name}.kd"
             if names[0] in within:
                 doubts = torques.gain_doubts(row)
-                kp, kd = torques.gains(row, (within[names[0]], within[names[1]]))
+                (of_kp, spread_kp), (of_kd, spread_kd) = (within[name] for name in names)
+                kp, kd = torques.gains(row, (of_kp, of_kd))
                 over = float(torques.kp[row]) / kp
                 found[joint.name] = (
-                    (kp, kp * doubts[0] * spread[names[0]] / over),
-                    (max(kd, 0.0), float(torques.kd[row]) * doubts[1] * spread[names[1]] / over),
+                    (kp, kp * doubts[0] * spread_kp / over),
+                    (max(kd, 0.0), float(torques.kd[row]) * doubts[1] * spread_kd / over),
                 )
         return found
 

@@ -95,6 +95,8 @@ class Term:
         The word of the law that is left without the last number; None where none is.
     takes
         Whether its first column is torque that a drive was asked for and doesn't give.
+    over_gain
+        Whether its first number is one over a gain: what is left is in units of what was asked for.
     rare
         Whether few machines have it.
     reach
@@ -111,6 +113,7 @@ class Term:
     reach: float | None = None
     plainer: str | None = None
     takes: bool = False
+    over_gain: bool = False
     rare: bool = False
 
     @property

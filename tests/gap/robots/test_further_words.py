@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.gap.robots.diagnose import diagnose_robot
-from chladni.robots.machine import Loop, Machine, Ripple, Stop, Transmission, as_described
+from chladni.robots.machine import Loop, Machine, Ripple, Stop, Transmission, Uneven, as_described
 from tests.robots.machines import RATE_HZ, arm, changed, commands, course, joint_log_of
 
 pytest.importorskip("mujoco")
@@ -42,6 +42,21 @@ def test_a_law_is_named_with_its_number(word: str, tmp_path: Path) -> None:
     assert [(one.effect, one.site) for one in found.causes] == [(word, "shoulder")]
     assert found.causes[0].probability > 0.6
     assert found.causes[0].parameters[name].value == pytest.approx(value, rel=0.15)
+    assert found.gap.after < 0.5 * found.gap.before
+
+
+def test_friction_that_changes_along_the_way_is_told_at_its_ends(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(SECONDS)
+    rubs = Uneven(places=(-1.0, 0.0, 1.0), beyond=(3.0, 0.0, -3.0))
+    machine = changed(as_described(robot), 0, friction=4.0, uneven=rubs)
+    position = read(machine, command)
+    found = diagnose_robot(robot, joint_log_of(robot, position, command=command))
+    assert [(one.effect, one.site) for one in found.causes] == [("coulomb_friction", "shoulder")]
+    low, high = position[0].min(), position[0].max()
+    told = found.causes[0].parameters
+    for name, place in (("force", 0.5 * (low + high)), ("at_lowest", low), ("at_highest", high)):
+        there = 4.0 + np.interp(place, rubs.places, rubs.beyond)
+        assert told[name].value == pytest.approx(there, abs=3.0 * told[name].std)
     assert found.gap.after < 0.5 * found.gap.before
 
 
