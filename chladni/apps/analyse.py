@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from chladni.apps.excitation import excitations
 from chladni.apps.findings import peak_sentence, response_sentences, soundness_sentences
-from chladni.apps.sources import Progress, Span, is_small, no_progress
+from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging, densities, transfer
 from chladni.apps.unit_peaks import unit_peaks
 from chladni.io.log import Log
 from chladni.io.log_reader import MostlyEmptyError
+from chladni.io.source import is_small
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse

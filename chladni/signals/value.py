@@ -5,7 +5,7 @@ from dataclasses import fields
 from typing import Any, NoReturn, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
@@ -61,6 +61,23 @@ def require_frequency_axis(frequency_hz: Real) -> None:
     """Raise `EstimateError` unless the axis is one-dimensional, finite and strictly rising."""
     if frequency_hz.ndim != 1 or not np.all(np.isfinite(frequency_hz)) or np.any(np.diff(frequency_hz) <= 0):
         raise EstimateError("frequency_hz must be one-dimensional, finite and strictly rising")
+
+
+def over_frequency(frequency_hz: ArrayLike, values: ArrayLike, dtype: type[ScalarT]) -> tuple[Real, NDArray[ScalarT]]:
+    """Give an axis and values ``[..., frequency]`` over it as arrays, the values with two axes at least.
+
+    Raises
+    ------
+    EstimateError
+        When the last axis of the values isn't as long as the frequencies.
+    """
+    axis = np.asarray(frequency_hz, dtype=np.float64)
+    table = np.atleast_2d(np.asarray(values, dtype=dtype))
+    if axis.ndim != 1 or table.shape[-1] != axis.size:
+        raise EstimateError(
+            f"values have shape {table.shape} over frequencies {axis.shape}; frequency is their last axis"
+        )
+    return axis, table
 
 
 # Looked up for every record that is made; dataclasses builds the tuple anew each time.

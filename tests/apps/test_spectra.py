@@ -3,8 +3,9 @@ import pytest
 from scipy import signal
 
 import chladni
-from chladni.apps import sources
+from chladni.apps.sources import Span, watched_grids
 from chladni.apps.spectra import Averaging, densities
+from chladni.io import source
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.testing import assert_close
@@ -21,8 +22,8 @@ def arm_log(tmp_path_factory):
 @pytest.fixture
 def large(monkeypatch):
     """Treat every log as one that doesn't fit in memory, in blocks of about a second."""
-    monkeypatch.setattr(sources, "IN_MEMORY_BYTES", 0)
-    monkeypatch.setattr(sources, "VALUES_IN_A_BLOCK", 1)
+    monkeypatch.setattr(source, "IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr(source, "VALUES_IN_A_BLOCK", 1)
 
 
 def noise(samples=20_000, channels=("a", "b"), rate_hz=500.0):
@@ -224,7 +225,7 @@ def test_a_tone_in_lines_that_are_not_judged_is_told_with_what_shows_it():
 def test_the_variance_of_a_large_log_is_watched_block_by_block(tmp_path, large):
     rows = {"stroke": 7 + np.sin(np.pi * np.arange(4600) / 200)}
     with log_of(tmp_path, rows) as log:
-        (grid,) = sources.watched_grids(log, None, sources.Span())
+        (grid,) = watched_grids(log, None, Span())
         assert len(list(grid)) > 1
         assert grid.variance("/stroke.accel.linear.x") == pytest.approx(rows["stroke"].var(), rel=1e-12)
         assert grid.variance("/none") == 0

@@ -162,7 +162,7 @@ def test_an_average_of_too_many_pairs_is_refused_before_any_sample_is_read(
 ) -> None:
     write_wide(tmp_path / "a.mcap", {"/a": 40})
     monkeypatch.setattr("chladni.spectral.products.MOST_RESULT_BYTES", 16 * 30**2 * 3)
-    monkeypatch.setattr("chladni.apps.sources.IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr("chladni.io.source.IN_MEMORY_BYTES", 0)
     with open_log(tmp_path / "a.mcap") as log:
         # Powers alone fit.
         assert chladni.psd(log).values.shape[0] == 40
