@@ -1,7 +1,7 @@
 """Frequency response functions between channels, each with its uncertainty."""
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +45,14 @@ class FrequencyResponse(Value):
     provenance
         How it was made.
     """
+
+    AXES: ClassVar = {
+        "values": ("responses", "references", "frequency_hz"),
+        "std": ("responses", "references", "frequency_hz"),
+        "coherence": ("responses", "frequency_hz"),
+        "excited": ("frequency_hz",),
+    }
+    ROWS: ClassVar = "frequency_hz"
 
     frequency_hz: Real
     values: NDArray[np.complexfloating]
@@ -136,6 +144,10 @@ class FrequencyResponse(Value):
     def unit(self, response: int, reference: int) -> str:
         """Unit of one function, such as ``(m/s^2)/N``."""
         return quotient(self.responses[response].unit, self.references[reference].unit)
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:
+        """Give the unit of a function."""
+        return self.unit(*place) if field in ("values", "std") else ""
 
     def select(self, responses: Names) -> Self:
         """Give the functions of the named responses, in the order asked for."""

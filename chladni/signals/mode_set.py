@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import pi
-from typing import Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,6 +57,12 @@ class ModeSet(Value):
     provenance
         How they were made; notes are advice.
     """
+
+    AXES: ClassVar = {
+        **dict.fromkeys(("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std"), ("mode",)),
+        **dict.fromkeys(("shapes", "shape_std"), ("mode", "channels")),
+    }
+    ROWS: ClassVar = "mode"
 
     frequency_hz: Real
     frequency_std_hz: Real
@@ -147,6 +153,10 @@ class ModeSet(Value):
             channels=tuple(channels),
             provenance=Provenance(estimator="as given"),
         )
+
+    def coordinate(self, axis: str) -> Sequence[Any]:
+        """Give the modes' numbers from 1 on, or the names of the channels."""
+        return np.arange(1, self.frequency_hz.size + 1) if axis == "mode" else Value.coordinate(self, axis)
 
     @property
     def poles(self) -> Complex:

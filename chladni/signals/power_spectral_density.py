@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,6 +35,9 @@ class PowerSpectralDensity(Value):
     provenance
         How it was made.
     """
+
+    AXES: ClassVar = {"values": ("channels", "frequency_hz"), "std": ("channels", "frequency_hz")}
+    ROWS: ClassVar = "frequency_hz"
 
     frequency_hz: Real
     values: Real
@@ -113,6 +116,10 @@ class PowerSpectralDensity(Value):
     def units(self) -> tuple[str, ...]:
         """Unit of each row, such as ``(m/s^2)^2/Hz``."""
         return tuple(power_density_unit(channel.unit) for channel in self.channels)
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a density."""
+        return self.units[place[0]]
 
     def select(self, names: Names) -> Self:
         """Give the densities of the named channels; `EstimateError` naming those there are when one is missing."""

@@ -10,11 +10,12 @@ from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.relative_motion import RelativeMotion
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.value import Drawn
 from chladni.signals.waterfall import Waterfall
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Study:
+class Study(Drawn):
     """Results of one analysis, ready to be drawn.
 
     Attributes

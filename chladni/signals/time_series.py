@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +61,9 @@ class TimeSeries(Value):
     >>> x.duration_s
     0.5
     """
+
+    AXES: ClassVar = {"values": ("channels", "time_s")}
+    ROWS: ClassVar = "time_s"
 
     values: NDArray[np.floating]
     sample_rate_hz: float
@@ -162,6 +165,14 @@ class TimeSeries(Value):
     def duration_s(self) -> float:
         """Number of samples over the rate."""
         return self.samples / self.sample_rate_hz
+
+    def coordinate(self, axis: str) -> Sequence[Any]:
+        """Give the seconds since the first sample, or the names of the channels."""
+        return self.times_s() if axis == "time_s" else Value.coordinate(self, axis)
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a channel."""
+        return self.channels[place[0]].unit
 
     def times_s(self) -> Real:
         """Seconds of each sample since the first, computed from the index so that no error adds up."""

@@ -1,14 +1,22 @@
 """What all value records share: arrays that can't be written to, and loud refusal of bare NumPy arithmetic."""
 
 import copy
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import Any, NoReturn, Self, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
+from chladni.signals.outlets import outlet
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 
@@ -20,15 +28,103 @@ def read_only(array: NDArray[ScalarT]) -> NDArray[ScalarT]:
     return view
 
 
-class Value:
+class Drawn:
+    """Abstract base of what has a picture."""
+
+    __slots__ = ()
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw it by matplotlib.
+
+        Parameters
+        ----------
+        ax
+            Axes to draw into; None makes a figure of as many as it takes, with pyplot.
+
+        Returns
+        -------
+        Axes
+            Those drawn into; of several the first, the others are in ``.figure.axes``.
+
+        Raises
+        ------
+        SetupError
+            When it has no picture, or one that takes more than the one axes given.
+        """
+        axes: Axes = outlet("plot")(self, ax=ax)
+        return axes
+
+    def _repr_png_(self) -> bytes | None:
+        """Give the picture that a notebook shows; None, so that it shows text, where there is nothing to draw."""
+        content: bytes | None = outlet("png")(self)
+        return content
+
+
+class Value(Drawn):
     """Abstract base of the value records; every subclass is a final, frozen, slotted dataclass.
 
     A value carries a unit and an axis that a bare array would lose, so ``np.asarray(value)`` and
     ``value * 2`` raise `TypeError`; the numbers are in the fields.
+
+    Attributes
+    ----------
+    AXES
+        Of the fields that make a table, the main one first: what each of their axes runs along, see `coordinate`.
+    ROWS
+        Which of these axes runs down the rows of a table.
     """
 
     __slots__ = ()
     __array_ufunc__ = None
+    AXES: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    ROWS: ClassVar[str] = ""
+
+    def coordinate(self, axis: str) -> Sequence[Any]:
+        """Give what stands along one axis of `AXES`: the numbers of that field, or the names of its channels."""
+        along: Sequence[Any] = getattr(self, axis)
+        # Channels know their names; this floor's records of them are above this module.
+        return along if isinstance(along, np.ndarray) else [getattr(one, "name", one) for one in along]
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002  # for those who know
+        """Give the unit of a field of `AXES` at a place along its axes but `ROWS`; empty where it has none."""
+        return ""
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Give it as a data frame: a row for each frequency, moment or mode, a column for each channel.
+
+        ``.attrs["units"]`` holds the unit of each column. Error bars, coherence and the like are columns of their own
+        (``tip std``).
+
+        Raises
+        ------
+        SetupError
+            When pandas isn't installed, or it's no table.
+        """
+        frame: pd.DataFrame = outlet("to_pandas")(self)
+        return frame
+
+    def to_xarray(self) -> "xr.Dataset":
+        """Give it as a dataset of labelled arrays.
+
+        Raises
+        ------
+        SetupError
+            When xarray isn't installed, or it's no table.
+        """
+        dataset: xr.Dataset = outlet("to_xarray")(self)
+        return dataset
+
+    def to_csv(self, path: Path | str) -> None:
+        """Write it as a table, columns as in `to_pandas` with their unit in brackets; complex ones in two parts.
+
+        Raises
+        ------
+        SetupError
+            When it's no table.
+        LogError
+            When the file can't be written.
+        """
+        outlet("to_csv")(self, path)
 
     def __array__(self, dtype: object = None, copy: object = None) -> NoReturn:
         raise TypeError(
