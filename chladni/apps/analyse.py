@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chladni.apps.excitation import excitations
@@ -10,10 +11,10 @@ from chladni.apps.findings import peak_sentence, response_sentences, soundness_s
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging, densities, transfer
 from chladni.apps.unit_peaks import unit_peaks
-from chladni.io.log import Log
+from chladni.io.log import Log, open_log
 from chladni.io.log_reader import MostlyEmptyError
 from chladni.io.source import is_small
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, Names, as_names
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -39,10 +40,10 @@ class _Shown:
 
 
 def analyse(
-    log: Log,
+    log: Log | Path | str,
     *,
-    channels: Sequence[str] | None = None,
-    references: Sequence[str] | None = None,
+    channels: Names | None = None,
+    references: Names | None = None,
     resolution_hz: float | None = None,
     start_s: float | None = None,
     end_s: float | None = None,
@@ -53,7 +54,7 @@ def analyse(
     Parameters
     ----------
     log
-        From `chladni.open`; its setup file tells points, units and references.
+        From `chladni.open`, or its path; its setup file tells points, units and references.
     channels
         Message paths; None for all channels that are uniform series and change at all.
     references
@@ -77,6 +78,9 @@ def analyse(
     EstimateError
         When no channel holds enough samples for a spectrum.
     """
+    log = open_log(log) if isinstance(log, Path | str) else log
+    channels = None if channels is None else as_names(channels)
+    references = None if references is None else as_names(references)
     averaging, span = Averaging(resolution_hz=resolution_hz), Span(start_s=start_s, end_s=end_s)
     soundness = soundness_sentences(log.info())
     progress(0.2)

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.atomic import atomic_write
+from chladni.io.files.csv import write_csv
 from chladni.signals.errors import SetupError
+from chladni.signals.time_series import TimeSeries
 from chladni.signals.value import Value
 
 if TYPE_CHECKING:
@@ -65,6 +67,10 @@ def to_xarray(value: Value) -> "xr.Dataset":
 
 def to_csv(value: Value, path: Path | str) -> None:
     """Write a value as a table; see `Value.to_csv`."""
+    if isinstance(value, TimeSeries):
+        # As logs are converted: with the start of its clock, and read again by `chladni.open`.
+        write_csv(value, path)
+        return
     columns = [real for one in _columns(value) for real in _real(one)]
     rows = value.coordinate(value.ROWS)
     titles = [value.ROWS, *(f"{one.name} [{one.unit}]" if one.unit else one.name for one in columns)]

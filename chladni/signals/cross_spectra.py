@@ -1,8 +1,7 @@
 """Averaged spectra, from which every estimate is derived: of all pairs of channels, or of each channel alone."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel, Names, find_channel, find_channels
 from chladni.signals.provenance import Provenance
 from chladni.signals.units import power_density_unit, product, quotient
-from chladni.signals.value import Value, require_frequency_axis, require_shape
+from chladni.signals.value import Coordinate, Value, require_frequency_axis, require_shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,7 +65,7 @@ class CrossSpectra(Value):
             channels=tuple(self.channels[row] for row in rows),
         )
 
-    def coordinate(self, axis: str) -> Sequence[Any]:
+    def coordinate(self, axis: str) -> Coordinate:
         """Give the frequencies, or the names of the channels, which run along two axes."""
         return Value.coordinate(self, axis.removesuffix("_b"))
 

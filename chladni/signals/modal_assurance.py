@@ -1,6 +1,5 @@
 """Likeness of modal vectors."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -8,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.arrays import Real
-from chladni.signals.value import Value, require_shape
+from chladni.signals.value import Coordinate, Value, require_shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,7 +33,7 @@ class ModalAssurance(Value):
         require_shape("values", self.values, (self.a_hz.size, self.b_hz.size), "modes of a x modes of b")
         self._freeze()
 
-    def coordinate(self, axis: str) -> Sequence[Any]:
+    def coordinate(self, axis: str) -> Coordinate:
         """Give the numbers of the modes of a set, from 1 on."""
         return np.arange(1, (self.a_hz if axis == "mode_a" else self.b_hz).size + 1)
 

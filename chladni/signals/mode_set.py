@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import pi
-from typing import Any, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,7 @@ from chladni.signals.modal_scale import ModalScale
 from chladni.signals.order_spread import OrderSpread
 from chladni.signals.provenance import Provenance
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
-from chladni.signals.value import Value, require_shape
+from chladni.signals.value import Coordinate, Value, require_shape
 
 Rows = Literal["modes", "channels"]
 
@@ -154,7 +154,7 @@ class ModeSet(Value):
             provenance=Provenance(estimator="as given"),
         )
 
-    def coordinate(self, axis: str) -> Sequence[Any]:
+    def coordinate(self, axis: str) -> Coordinate:
         """Give the modes' numbers from 1 on, or the names of the channels."""
         return np.arange(1, self.frequency_hz.size + 1) if axis == "mode" else Value.coordinate(self, axis)
 

@@ -44,6 +44,8 @@ class Study(Drawn):
         Where the points sit; empty when no setup file was given.
     findings
         Sentences about the log and its spectra: soundness first, then what was seen, then advice.
+    pictures
+        Titles and PNGs of what has no place of its own above.
     """
 
     title: str
@@ -58,3 +60,4 @@ class Study(Drawn):
     relative_motion: tuple[RelativeMotion, ...] = ()
     geometry: Geometry = field(default_factory=Geometry)
     findings: tuple[str, ...] = ()
+    pictures: tuple[tuple[str, bytes], ...] = ()

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.channel import UNKNOWN, Channel, Names, Units, as_names, find_channel, made_channels, numbered
 from chladni.signals.errors import EstimateError
-from chladni.signals.value import Value, require_shape
+from chladni.signals.value import Coordinate, Value, require_shape
 from chladni.signals.wording import counted
 
 NS_PER_S = 1_000_000_000
@@ -166,7 +166,7 @@ class TimeSeries(Value):
         """Number of samples over the rate."""
         return self.samples / self.sample_rate_hz
 
-    def coordinate(self, axis: str) -> Sequence[Any]:
+    def coordinate(self, axis: str) -> Coordinate:
         """Give the seconds since the first sample, or the names of the channels."""
         return self.times_s() if axis == "time_s" else Value.coordinate(self, axis)
 

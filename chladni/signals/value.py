@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ScalarT = TypeVar("ScalarT", bound=np.generic)
+#: What stands along an axis: numbers, or names.
+Coordinate = NDArray[Any] | Sequence[Any]
 
 
 def read_only(array: NDArray[ScalarT]) -> NDArray[ScalarT]:
@@ -79,9 +81,9 @@ class Value(Drawn):
     AXES: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     ROWS: ClassVar[str] = ""
 
-    def coordinate(self, axis: str) -> Sequence[Any]:
+    def coordinate(self, axis: str) -> Coordinate:
         """Give what stands along one axis of `AXES`: the numbers of that field, or the names of its channels."""
-        along: Sequence[Any] = getattr(self, axis)
+        along: Coordinate = getattr(self, axis)
         # Channels know their names; this floor's records of them are above this module.
         return along if isinstance(along, np.ndarray) else [getattr(one, "name", one) for one in along]
 
@@ -116,6 +118,8 @@ class Value(Drawn):
 
     def to_csv(self, path: Path | str) -> None:
         """Write it as a table, columns as in `to_pandas` with their unit in brackets; complex ones in two parts.
+
+        Points, directions and how it was made aren't in a table.
 
         Raises
         ------

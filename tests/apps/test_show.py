@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 import chladni
@@ -37,6 +38,23 @@ def test_the_viewer_gets_the_study(monkeypatch):
     monkeypatch.setattr(chladni.viewers.rerun, "spawn", shown.append)
     chladni.show(Study(title="a"))
     assert [study.title for study in shown] == ["a"]
+
+
+def test_every_value_has_a_page_in_a_file(tmp_path):
+    series = chladni.TimeSeries.from_arrays(np.random.default_rng(1).standard_normal((2, 4096)), sample_rate_hz=100.0)
+    response = chladni.frf(series, reference="ch1")
+    modes = chladni.ModeSet.from_arrays([1.0, 2.0], [[1.0, 0.5, 0.2], [1.0, -0.5, 0.1]])
+    values = [
+        series, chladni.psd(series), chladni.cross_spectra(series), response, chladni.waterfall(series), modes,
+        chladni.coherence(series, references="ch1"), chladni.mac(modes),
+    ]  # fmt: skip
+    for value in values:
+        chladni.show(value, save=tmp_path / "one.rrd")
+        assert (tmp_path / "one.rrd").stat().st_size > 1000
+    assert [title for title, _ in gather(*values).pictures] == ["Coherence", "Modal assurance"]
+    with pytest.raises(SetupError, match="a float can't be shown"):
+        chladni.show(1.0, save=tmp_path / "two.rrd")
+    assert not (tmp_path / "two.rrd").exists()
 
 
 def test_transfer_functions_that_are_not_shown_are_told(tmp_path):
