@@ -3,7 +3,7 @@
 ::
 
     log = chladni.open("arm.mcap")                              # lazy: nothing decoded yet; data files, too
-    frf = chladni.frf(log, reference="/hammer.wrench.force.x", resolution_hz=0.5)
+    frf = chladni.frf(log, references="/hammer.wrench.force.x", resolution_hz=0.5)
     modes = chladni.identify_modes(frf, band_hz=(10, 400))
     chladni.show(log, frf, modes)                               # rerun
 

@@ -18,6 +18,7 @@ from chladni.signals.channel import Channel, Names, as_names
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.renamed import renamed
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.waterfall import Waterfall
@@ -39,8 +40,9 @@ class _Shown:
     notes: tuple[str, ...] = ()
 
 
+@renamed(log="source")
 def analyse(
-    log: Log | Path | str,
+    source: Log | Path | str,
     *,
     channels: Names | None = None,
     references: Names | None = None,
@@ -53,8 +55,8 @@ def analyse(
 
     Parameters
     ----------
-    log
-        From `chladni.open`, or its path; its setup file tells points, units and references.
+    source
+        A log from `chladni.open`, or its path; its setup file tells points, units and references.
     channels
         Message paths; None for all channels that are uniform series and change at all.
     references
@@ -78,7 +80,7 @@ def analyse(
     EstimateError
         When no channel holds enough samples for a spectrum.
     """
-    log = open_log(log) if isinstance(log, Path | str) else log
+    log = open_log(source) if isinstance(source, Path | str) else source
     channels = None if channels is None else as_names(channels)
     references = None if references is None else as_names(references)
     averaging, span = Averaging(resolution_hz=resolution_hz), Span(start_s=start_s, end_s=end_s)

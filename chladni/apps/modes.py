@@ -37,6 +37,7 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.mode_set import ModeSet
+from chladni.signals.renamed import renamed
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.unit_text import in_unit
 from chladni.signals.wording import counted
@@ -79,13 +80,14 @@ class Wanted:
         )
 
 
+@renamed(reference="references", channels="responses")
 @in_one_thread()
 def identify_modes(
     source: SeriesLike | FrequencyResponse | CrossSpectra,
     *,
-    reference: Names | None = None,
+    references: Names | None = None,
+    responses: Names | None = None,
     operational: bool = False,
-    channels: Names | None = None,
     method: Method | None = None,
     band_hz: Band | Sequence[Band] | None = None,
     count: int | None = None,
@@ -105,12 +107,12 @@ def identify_modes(
         first (or, with `operational`, whose responses alone are used); frequency responses, or an array of them
         ``[response, reference, frequency]``; or averaged cross-spectra of responses. Of a universal file without time
         records the frequency responses are taken that it holds, else its modes.
-    reference
+    references
         Channel of the excitation, or several; None takes those whose role is reference, else the first force.
+    responses
+        Channels of the motions; None takes all motions of the most common unit on one sampling grid.
     operational
         Whether to use responses alone, excited by wind, traffic, the machine's own work.
-    channels
-        Responses; None takes all motions of the most common unit on one sampling grid.
     method
         `PolyReferenceLeastSquares` (the default for frequency responses), `CircleFit`, `HalfPower`;
         `CovarianceDrivenSubspace` (the default for responses alone), `FrequencyDomainDecomposition`,
@@ -147,7 +149,7 @@ def identify_modes(
     Examples
     --------
     >>> with open_log("arm.mcap") as log:  # doctest: +SKIP
-    ...     modes = identify_modes(log, reference="/shaker.wrench.force.x", band_hz=(10, 400))
+    ...     modes = identify_modes(log, references="/shaker.wrench.force.x", band_hz=(10, 400))
     """
     wanted = Wanted.of(bands_hz=_bands(band_hz), count=count, frequencies_hz=frequencies_hz)
     span, averaging = Span(start_s=start_s, end_s=end_s), Averaging(resolution_hz=resolution_hz)
@@ -157,15 +159,15 @@ def identify_modes(
         given = response_of(source, frequency_hz=frequency_hz)
         return modes_of_response(over_hit_points(given), method=method, wanted=wanted)
     source = log_or_series(source, sample_rate_hz=sample_rate_hz)
-    responses = None if channels is None else as_names(channels)
+    named = None if responses is None else as_names(responses)
     if isinstance(source, Log) and not source.channels and source.functions is None and source.modes is not None:
         return source.modes
     if operational or isinstance(method, FromResponses):
         return modes_of_responses(
-            source, channels=responses, method=method, wanted=wanted, averaging=averaging, span=span
+            source, channels=named, method=method, wanted=wanted, averaging=averaging, span=span
         )
     return functions_and_modes(
-        source, reference, responses, method=method, wanted=wanted, averaging=averaging, span=span
+        source, references, named, method=method, wanted=wanted, averaging=averaging, span=span
     )[1]
 
 

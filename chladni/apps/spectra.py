@@ -17,6 +17,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
+from chladni.signals.renamed import renamed
 from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import rounded_up
@@ -158,11 +159,12 @@ def densities(
     return (noted, *found[1:])
 
 
+@renamed(reference="references", response="responses")
 def frf(
     source: SeriesLike,
     *,
-    reference: Names | None = None,
-    response: Names | None = None,
+    references: Names | None = None,
+    responses: Names | None = None,
     estimator: Estimator = "H1",
     resolution_hz: float | None = None,
     window: Window | None = None,
@@ -182,9 +184,9 @@ def frf(
     ----------
     source
         A log (read block by block when it's large), the path to one, a series, or an array ``[channel, sample]``.
-    reference
+    references
         Message path of the excitation, or several; None takes those whose role is reference, else the first force.
-    response
+    responses
         Message paths of the responses; None for all other channels that share the reference's sampling grid and
         change at all.
     estimator
@@ -211,18 +213,16 @@ def frf(
     --------
     >>> import numpy as np
     >>> force = np.random.default_rng(1).standard_normal(2**14)
-    >>> response = frf({"f": force, "a": 0.5 * force}, sample_rate_hz=100.0, reference="f", resolution_hz=1.0)
+    >>> response = frf({"f": force, "a": 0.5 * force}, sample_rate_hz=100.0, references="f", resolution_hz=1.0)
     >>> float(abs(response.values[0, 0, 10]).round(12))
     0.5
     """
     source = log_or_series(source, sample_rate_hz=sample_rate_hz)
-    references = None if reference is None else as_names(reference)
-    responses = None if response is None else as_names(response)
     averaging = Averaging(resolution_hz=resolution_hz, window=window, overlap=overlap)
     return transfer(
         source,
-        references,
-        responses,
+        None if references is None else as_names(references),
+        None if responses is None else as_names(responses),
         estimator=estimator,
         averaging=averaging,
         span=Span(start_s=start_s, end_s=end_s, join=join),

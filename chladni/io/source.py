@@ -163,18 +163,22 @@ def response_of(
 
 
 def density_of(
-    source: PowerSpectralDensity | SeriesLike, *, frequency_hz: ArrayLike | None = None
+    source: PowerSpectralDensity | SeriesLike,
+    *,
+    frequency_hz: ArrayLike | None = None,
+    averages: float | None = None,
 ) -> PowerSpectralDensity:
     """Give power spectral densities, those of an array ``[channel, frequency]``; errors are as for `response_of`."""
     if isinstance(source, PowerSpectralDensity):
         _require_none(frequency_hz)
+        _require_none(averages)
         return source
-    return PowerSpectralDensity.from_arrays(*_over_frequency(source, frequency_hz))
+    return PowerSpectralDensity.from_arrays(*_over_frequency(source, frequency_hz), averages=averages)
 
 
-def _require_none(frequency_hz: ArrayLike | None) -> None:
-    if frequency_hz is not None:
-        raise SetupError("frequency_hz is for arrays; spectra know their own, so leave it out")
+def _require_none(of_an_array: ArrayLike | None) -> None:
+    if of_an_array is not None:
+        raise SetupError("frequency_hz and averages are for arrays; spectra know their own, so leave them out")
 
 
 def _over_frequency(source: object, frequency_hz: ArrayLike | None) -> tuple[ArrayLike, ArrayLike]:

@@ -168,7 +168,7 @@ def test_an_average_of_too_many_pairs_is_refused_before_any_sample_is_read(
         assert chladni.psd(log).values.shape[0] == 40
         monkeypatch.setattr(type(log), "blocks", lambda *_, **__: iter([pytest.fail("read")] for _ in "1"))
         with pytest.raises(EstimateError, match=r"40 channels x 3 lines would take .* fewer channels"):
-            chladni.frf(log, reference="/a.f0")
+            chladni.frf(log, references="/a.f0")
 
 
 def test_many_streams_of_one_grid_are_one_series(tmp_path: Path) -> None:

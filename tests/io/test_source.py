@@ -17,8 +17,8 @@ VERBS = {
     "cross_spectra": chladni.cross_spectra,
     "waterfall": chladni.waterfall,
     "coherence": partial(chladni.coherence, references="x"),
-    "frf": partial(chladni.frf, reference="x"),
-    "identify_modes": partial(chladni.identify_modes, reference="x"),
+    "frf": partial(chladni.frf, references="x"),
+    "identify_modes": partial(chladni.identify_modes, references="x"),
 }
 
 
@@ -97,7 +97,7 @@ def test_blocks_stay_blocks_and_take_no_choice():
 
 
 def test_modes_are_found_from_an_array_of_frequency_responses():
-    response = chladni.frf(series(), reference="x", resolution_hz=0.5)
+    response = chladni.frf(series(), references="x", resolution_hz=0.5)
     modes = chladni.identify_modes(response.values, frequency_hz=response.frequency_hz)
     (found_hz,), (damping,) = modes.frequency_hz, modes.damping_ratio
     # Truth by construction; nothing is known of the error of an array, so that 1 % is asked for.
@@ -110,7 +110,7 @@ def test_spectra_of_arrays_need_frequencies_and_spectra_take_none():
     for make, array in ((response_of, lines + 0j), (density_of, lines)):
         with pytest.raises(chladni.SetupError, match="give frequency_hz="):
             make(array)
-        with pytest.raises(chladni.SetupError, match="leave it out"):
+        with pytest.raises(chladni.SetupError, match="leave them out"):
             make(make(array, frequency_hz=lines), frequency_hz=lines)
         with pytest.raises(chladni.EstimateError, match="frequency is their last axis"):
             make(array, frequency_hz=lines[1:])
