@@ -292,7 +292,7 @@ def valve_in_the_loop(step_m: float = 0.05, seconds: float = 3.0, rate_hz: float
         ("all three", ("valve_lag", "saturation", "dead_zone")),
     ):
         model = drive_model(HYDRAULIC, {}, {"loop": "position", **dict.fromkeys(words, "on")})
-        found = simulate(model, {"reference": Step(size=step_m)}, seconds=seconds, rate_hz=rate_hz)
+        found = simulate(model, {"reference": Step(size=step_m)}, duration_s=seconds, sample_rate_hz=rate_hz)
         names = [terminal.name for terminal in model.compile().outputs]
         place, flow = (found.outputs.values[names.index(signal)] for signal in ("displacement", "motor_flow"))
         outside = np.flatnonzero(np.abs(place - place[-1]) > 0.05 * step_m)

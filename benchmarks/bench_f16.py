@@ -16,7 +16,7 @@ def main() -> None:
     print("| --- | ---: | ---: | ---: | ---: | ---: |")
     for level, (frequency_hz, height) in PUBLISHED.items():
         with chladni.open_log(data / f"f16_level{level}.mcap") as log:
-            response = chladni.frf(log, reference=FORCE, response=PAYLOAD)
+            response = chladni.frf(log, references=FORCE, responses=PAYLOAD)
         peaks = chladni.find_response_peaks(response)
         torsion = max((peak for peak in peaks if 6.8 < peak.frequency_hz < 7.8), key=lambda peak: peak.height)
         outside = sum(not 2.0 <= peak.frequency_hz <= 15.0 for peak in peaks)

@@ -77,7 +77,7 @@ def write_log(model: Model, hidden: tuple | None, path: Path) -> None:
         word, site, values, variant = hidden
         machine = machine.with_effects([chladni.attached(word, site, values, variant=variant)])
     push = Multisine(rms=60.0, period_s=6.0, band_hz=(2.0, 150.0))
-    run = chladni.simulate(machine, push, seconds=SAMPLES / RATE_HZ, rate_hz=RATE_HZ, seed=2)
+    run = chladni.simulate(machine, push, duration_s=SAMPLES / RATE_HZ, sample_rate_hz=RATE_HZ, seed=2)
     measured = run.outputs.values
     noise = NOISE * measured.std(axis=1, keepdims=True) * rng.standard_normal(measured.shape)
     log = replace(

@@ -46,7 +46,7 @@ def chain() -> None:
     """20 000 cycles with the default resolution."""
     for seed in range(3):
         series = truth.record(CHAIN, cycles=20_000, rng=np.random.default_rng(seed), noise=0.01)
-        modes = identify(chladni.frf(series, reference=FORCE))
+        modes = identify(chladni.frf(series, references=FORCE))
         assert modes.frequency_hz.size == 5, modes.frequency_hz
         frequency = np.max(np.abs(modes.frequency_hz / CHAIN.frequency_hz - 1))
         damping = np.max(np.abs(modes.damping_ratio / CHAIN.damping_ratio - 1))
@@ -81,19 +81,19 @@ def claims_nothing(seed: int) -> bool:
     samples, references, responses, resolution_hz = NOISE[seed % len(NOISE)]
     series = truth.noise_record(samples, rng=np.random.default_rng(seed), references=references, responses=responses)
     names = [truth.FORCE.format(number) for number in range(references)]
-    return identify(chladni.frf(series, reference=names, resolution_hz=resolution_hz)).frequency_hz.size == 0
+    return identify(chladni.frf(series, references=names, resolution_hz=resolution_hz)).frequency_hz.size == 0
 
 
 def finds_five(seed: int) -> bool:
     series = truth.record(CHAIN, cycles=2000, rng=np.random.default_rng(seed), noise=1.0, force_noise=0.0)
-    modes = identify(chladni.frf(series, reference=FORCE, resolution_hz=0.008))
+    modes = identify(chladni.frf(series, references=FORCE, resolution_hz=0.008))
     return modes.frequency_hz.size == 5 and bool(np.max(np.abs(modes.frequency_hz / CHAIN.frequency_hz - 1)) < 2e-3)
 
 
 def aircraft(data: Path) -> None:
     for level, expected in AIRCRAFT.items():
         with chladni.open_log(data / f"f16_level{level}.mcap") as log:
-            modes = identify(chladni.frf(log, reference="/shaker.wrench.force.z"))
+            modes = identify(chladni.frf(log, references="/shaker.wrench.force.z"))
         off = [np.min(np.abs(modes.frequency_hz - frequency_hz)) for frequency_hz in expected]
         further = [f"{f:.2f}" for f in modes.frequency_hz if np.min(np.abs(np.array(expected) - f)) > 0.05]
         found = ", ".join(
@@ -108,7 +108,7 @@ def aircraft(data: Path) -> None:
 
 def hammer(data: Path) -> None:
     with chladni.open_log(data / "hammer.mcap") as log:
-        response = chladni.frf(log, reference="/daq.hammer")
+        response = chladni.frf(log, references="/daq.hammer")
     modes = PolyReferenceLeastSquares().identify(response, band_hz=(200.0, 3500.0))
     off = [float(np.min(np.abs(modes.frequency_hz / frequency_hz - 1))) for frequency_hz in HAMMER]
     found = ", ".join(f"{f:.1f} ± {s:.1f}" for f, s in zip(modes.frequency_hz, modes.frequency_std_hz, strict=True))

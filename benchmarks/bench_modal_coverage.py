@@ -25,7 +25,7 @@ def one(task: tuple[int, int, float]) -> list[np.ndarray] | None:
     seed, cycles, force_noise = task
     rng = np.random.default_rng([9, seed])
     series = truth.record(CHAIN, cycles=cycles, rng=rng, noise=NOISE, force_noise=force_noise)
-    modes = chladni.identify_modes(series, reference=truth.FORCE.format(0))
+    modes = chladni.identify_modes(series, references=truth.FORCE.format(0))
     if modes.frequency_hz.size != 5:
         return None
     free = modes.shape_std.real > 0

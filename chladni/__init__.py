@@ -3,7 +3,7 @@
 ::
 
     log = chladni.open("arm.mcap")                              # lazy: nothing decoded yet; data files, too
-    frf = chladni.frf(log, reference="/hammer.wrench.force.x", resolution_hz=0.5)
+    frf = chladni.frf(log, references="/hammer.wrench.force.x", resolution_hz=0.5)
     modes = chladni.identify_modes(frf, band_hz=(10, 400))
     chladni.show(log, frf, modes)                               # rerun
 
@@ -16,6 +16,8 @@ The names below are the public surface; each is imported when it is first used, 
 
 from typing import TYPE_CHECKING
 
+from chladni.signals.outlets import register as _register
+
 __version__ = "0.1.0"
 
 # Public name -> module that defines it.
@@ -26,6 +28,7 @@ _HOME = {
     "frf": "chladni.apps.spectra",
     "identify_modes": "chladni.apps.modes",
     "psd": "chladni.apps.spectra",
+    "plot": "chladni.apps.plot",
     "show": "chladni.apps.show",
     "find_peaks": "chladni.spectral.peaks",
     "find_response_peaks": "chladni.spectral.peaks",
@@ -58,6 +61,7 @@ _HOME = {
     "Coherence": "chladni.signals.coherence",
     "CrossSpectra": "chladni.signals.cross_spectra",
     "FrequencyResponse": "chladni.signals.frequency_response",
+    "ModalAssurance": "chladni.signals.modal_assurance",
     "ModeSet": "chladni.signals.mode_set",
     "PowerSpectralDensity": "chladni.signals.power_spectral_density",
     "Study": "chladni.signals.study",
@@ -82,6 +86,7 @@ __all__ = [
     "FrequencyResponse",
     "HalfPower",
     "LogError",
+    "ModalAssurance",
     "ModeSet",
     "ModelError",
     "PolyReferenceLeastSquares",
@@ -109,6 +114,7 @@ __all__ = [
     "open",
     "open_log",
     "optimise",
+    "plot",
     "psd",
     "relative_motion",
     "show",
@@ -119,11 +125,21 @@ __all__ = [
     "write_model",
 ]
 
+# What values call to be drawn and made into tables.
+_register(
+    plot="chladni.apps.plot",
+    png="chladni.apps.plot",
+    to_csv="chladni.io.frames",
+    to_pandas="chladni.io.frames",
+    to_xarray="chladni.io.frames",
+)
+
 if TYPE_CHECKING:
     from chladni.apps.analyse import analyse
     from chladni.apps.diagnose import diagnose_gap
     from chladni.apps.level_location import locate_from_levels
     from chladni.apps.modes import identify_modes
+    from chladni.apps.plot import plot
     from chladni.apps.show import show
     from chladni.apps.spectra import frf, psd
     from chladni.io.log import open, open_log  # noqa: A004  # as chladni.open
@@ -151,6 +167,7 @@ if TYPE_CHECKING:
     from chladni.signals.cross_spectra import CrossSpectra
     from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
     from chladni.signals.frequency_response import FrequencyResponse
+    from chladni.signals.modal_assurance import ModalAssurance
     from chladni.signals.mode_set import ModeSet
     from chladni.signals.power_spectral_density import PowerSpectralDensity
     from chladni.signals.study import Study

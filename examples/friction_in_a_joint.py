@@ -24,10 +24,10 @@ def main() -> None:
         print(name)
         for level_n in (1.0, 4.0, 16.0):
             excitation = Multisine(rms=level_n, period_s=8.0, band_hz=(5.0, 100.0))
-            run = chladni.simulate(model, excitation, seconds=SECONDS, rate_hz=RATE_HZ, seed=1)
+            run = chladni.simulate(model, excitation, duration_s=SECONDS, sample_rate_hz=RATE_HZ, seed=1)
             tool, push = run.outputs.select(["acc_tool"]), run.inputs.select(["push"])
             both = replace(tool, values=np.vstack([push.values, tool.values]), channels=push.channels + tool.channels)
-            modes = chladni.identify_modes(both, reference="push", band_hz=(15.0, 40.0), count=1)
+            modes = chladni.identify_modes(both, references="push", band_hz=(15.0, 40.0), count=1)
             for frequency_hz, damping in zip(modes.frequency_hz, modes.damping_ratio, strict=True):
                 print(f"  pushed with {level_n:4.0f} N RMS: {frequency_hz:7.3f} Hz, damping {damping:6.2%}")
 

@@ -16,7 +16,7 @@ def main() -> None:
         print(f"{data / 'hammer.mcap'} is not there; set CHLADNI_DATA to the folder of measured logs")
         return
     with chladni.open_log(data / "hammer.mcap") as log:
-        response = chladni.frf(log, reference="/daq.hammer", response="/daq.response")
+        response = chladni.frf(log, references="/daq.hammer", responses="/daq.response")
     print(f"{response.provenance.averages} hits averaged")
     for note in response.provenance.notes:
         print("-", note)

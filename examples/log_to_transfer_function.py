@@ -15,7 +15,9 @@ def main() -> None:
         chladni.write_mcap(arm.series, path)
         with chladni.open_log(path) as log:
             print(f"{len(log.channels)} channels:", ", ".join(channel.name for channel in log.channels))
-            response = chladni.frf(log, reference=arm.reference, response="/tool.accel.linear.x", resolution_hz=0.25)
+            response = chladni.frf(
+                log, references=arm.reference, responses="/tool.accel.linear.x", resolution_hz=0.25
+            )
     account = response.provenance
     print(f"{account.estimator}, {account.effective_averages:.0f} effective averages of {account.segment_s:g} s")
     for peak in chladni.find_response_peaks(response):

@@ -57,7 +57,7 @@ def log_of_the_machine() -> chladni.TimeSeries:
     """Simulate the arm with the drag, and let noise fall on its sensors."""
     machine = arm_model().with_effects([chladni.attached(CUBIC_DRAG, "elbow", {"coefficient": COEFFICIENT})])
     push = Multisine(rms=150.0, period_s=3.0, band_hz=(5.0, 120.0))
-    run = chladni.simulate(machine, push, seconds=SECONDS, rate_hz=RATE_HZ, seed=2)
+    run = chladni.simulate(machine, push, duration_s=SECONDS, sample_rate_hz=RATE_HZ, seed=2)
     rng = np.random.default_rng(3)
     measured = run.outputs.values
     noise = NOISE * measured.std(axis=1, keepdims=True) * rng.normal(size=measured.shape)

@@ -20,8 +20,8 @@ def main() -> None:
         print(f"{data / 'f16_level1.mcap'} is not there; set CHLADNI_DATA to the folder of measured logs")
         return
     with chladni.open_log(data / "f16_level1.mcap") as log:
-        periods = chladni.frf(log, reference=FORCE, response=PAYLOAD)
-        windowed = chladni.frf(log, reference=FORCE, response=PAYLOAD, window="hann", resolution_hz=400 / 8192)
+        periods = chladni.frf(log, references=FORCE, responses=PAYLOAD)
+        windowed = chladni.frf(log, references=FORCE, responses=PAYLOAD, window="hann", resolution_hz=400 / 8192)
     for name, response in (("whole periods", periods), ("Hann window", windowed)):
         excited = response.excited & (response.frequency_hz > 7.0) & (response.frequency_hz < 7.6)
         print(f"{name}: peak {np.abs(response.values[0, 0, excited]).max():.3f} {response.unit(0, 0)}")

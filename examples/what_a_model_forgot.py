@@ -39,7 +39,7 @@ def log_of_the_machine() -> chladni.TimeSeries:
         [chladni.attached("coulomb_friction", "elbow", {"force": FRICTION_N}, variant="bristle")]
     )
     push = Multisine(rms=40.0, period_s=4.0, band_hz=(5.0, 120.0))
-    run = chladni.simulate(machine, push, seconds=SECONDS, rate_hz=RATE_HZ, seed=2)
+    run = chladni.simulate(machine, push, duration_s=SECONDS, sample_rate_hz=RATE_HZ, seed=2)
     measured = run.outputs.values
     noise = NOISE * measured.std(axis=1, keepdims=True) * rng.normal(size=measured.shape)
     return replace(

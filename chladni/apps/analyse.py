@@ -3,19 +3,22 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chladni.apps.excitation import excitations
 from chladni.apps.findings import peak_sentence, response_sentences, soundness_sentences
-from chladni.apps.sources import Progress, Span, is_small, no_progress
+from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging, densities, transfer
 from chladni.apps.unit_peaks import unit_peaks
-from chladni.io.log import Log
+from chladni.io.log import Log, open_log
 from chladni.io.log_reader import MostlyEmptyError
-from chladni.signals.channel import Channel
+from chladni.io.source import is_small
+from chladni.signals.channel import Channel, Names, as_names
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.renamed import renamed
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.waterfall import Waterfall
@@ -37,11 +40,12 @@ class _Shown:
     notes: tuple[str, ...] = ()
 
 
+@renamed(log="source")
 def analyse(
-    log: Log,
+    source: Log | Path | str,
     *,
-    channels: Sequence[str] | None = None,
-    references: Sequence[str] | None = None,
+    channels: Names | None = None,
+    references: Names | None = None,
     resolution_hz: float | None = None,
     start_s: float | None = None,
     end_s: float | None = None,
@@ -51,8 +55,8 @@ def analyse(
 
     Parameters
     ----------
-    log
-        From `chladni.open`; its setup file tells points, units and references.
+    source
+        A log from `chladni.open`, or its path; its setup file tells points, units and references.
     channels
         Message paths; None for all channels that are uniform series and change at all.
     references
@@ -76,6 +80,9 @@ def analyse(
     EstimateError
         When no channel holds enough samples for a spectrum.
     """
+    log = open_log(source) if isinstance(source, Path | str) else source
+    channels = None if channels is None else as_names(channels)
+    references = None if references is None else as_names(references)
     averaging, span = Averaging(resolution_hz=resolution_hz), Span(start_s=start_s, end_s=end_s)
     soundness = soundness_sentences(log.info())
     progress(0.2)

@@ -57,8 +57,8 @@ def step_log(shown: Shown) -> bytes:
     simulation = simulate(
         shown.model,
         {instrument.step_input: Step(size=instrument.step_size)},
-        seconds=seconds,
-        rate_hz=SAMPLES / seconds,
+        duration_s=seconds,
+        sample_rate_hz=SAMPLES / seconds,
     )
     return _written("step.mcap", lambda path: write_mcap([simulation.inputs, simulation.outputs], path))
 

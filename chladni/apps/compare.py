@@ -115,9 +115,9 @@ def _modes(
     old, new = (
         identify_modes(
             log,
-            reference=None if operational else references or None,
+            references=None if operational else references or None,
             operational=operational,
-            channels=named or None,
+            responses=named or None,
             resolution_hz=None if operational else resolution_hz,
         )
         for log in (before, after)

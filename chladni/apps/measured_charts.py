@@ -118,7 +118,7 @@ def _transfers(driving: TimeSeries, measured: TimeSeries, simulated: TimeSeries)
     series = _joined(measured, simulated, first=driving)
     names = [channel.name for channel in series.channels[1:]]
     response = frf(
-        series, reference=_NAMES[0] + reference, response=names, resolution_hz=SEGMENTS / series.duration_s
+        series, references=_NAMES[0] + reference, responses=names, resolution_hz=SEGMENTS / series.duration_s
     )
     return [
         Chart(

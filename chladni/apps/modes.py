@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chladni.apps.excitation import excitation_names, stored_functions
 from chladni.apps.modal_channels import motions_of_one_unit, responses_alone
@@ -13,6 +14,7 @@ from chladni.apps.sources import Progress, Span, Watched, no_progress
 from chladni.apps.spectra import Averaging, transfer
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
+from chladni.io.source import SeriesLike, log_or_series, response_of
 from chladni.modal.checks.roving import over_hit_points
 from chladni.modal.experimental.bands import join_bands
 from chladni.modal.experimental.circle_fit import CircleFit
@@ -28,12 +30,14 @@ from chladni.modal.operational.harmonics import (
     without_machines,
 )
 from chladni.modal.operational.subspace import CovarianceDrivenSubspace
+from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.mode_set import ModeSet
+from chladni.signals.renamed import renamed
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.unit_text import in_unit
 from chladni.signals.wording import counted
@@ -76,18 +80,21 @@ class Wanted:
         )
 
 
+@renamed(reference="references", channels="responses")
 @in_one_thread()
 def identify_modes(
-    source: Log | TimeSeries | FrequencyResponse | CrossSpectra,
+    source: SeriesLike | FrequencyResponse | CrossSpectra,
     *,
-    reference: str | Sequence[str] | None = None,
+    references: Names | None = None,
+    responses: Names | None = None,
     operational: bool = False,
-    channels: Sequence[str] | None = None,
     method: Method | None = None,
     band_hz: Band | Sequence[Band] | None = None,
     count: int | None = None,
     frequencies_hz: Sequence[float] | None = None,
     resolution_hz: float | None = None,
+    sample_rate_hz: float | None = None,
+    frequency_hz: ArrayLike | None = None,
     start_s: float | None = None,
     end_s: float | None = None,
 ) -> ModeSet:
@@ -96,15 +103,16 @@ def identify_modes(
     Parameters
     ----------
     source
-        A log or a series, whose frequency responses are estimated first (or, with `operational`, whose responses
-        alone are used), frequency responses, or averaged cross-spectra of responses. Of a universal file without
-        time records the frequency responses are taken that it holds, else its modes.
-    reference
+        A log, the path to one, a series or an array ``[channel, sample]``, whose frequency responses are estimated
+        first (or, with `operational`, whose responses alone are used); frequency responses, or an array of them
+        ``[response, reference, frequency]``; or averaged cross-spectra of responses. Of a universal file without time
+        records the frequency responses are taken that it holds, else its modes.
+    references
         Channel of the excitation, or several; None takes those whose role is reference, else the first force.
+    responses
+        Channels of the motions; None takes all motions of the most common unit on one sampling grid.
     operational
         Whether to use responses alone, excited by wind, traffic, the machine's own work.
-    channels
-        Responses; None takes all motions of the most common unit on one sampling grid.
     method
         `PolyReferenceLeastSquares` (the default for frequency responses), `CircleFit`, `HalfPower`;
         `CovarianceDrivenSubspace` (the default for responses alone), `FrequencyDomainDecomposition`,
@@ -118,6 +126,10 @@ def identify_modes(
         The modes nearest to these frequencies, instead of an automatic choice.
     resolution_hz
         Distance of the lines of the frequency responses (of the cross-spectra for frequency domain decomposition).
+    sample_rate_hz
+        Samples a second of an array, or of a file that doesn't say it.
+    frequency_hz
+        ``[frequency]``: makes of the array frequency responses over these lines.
     start_s, end_s
         Only samples with ``start_s <= t < end_s``, seconds from the start.
 
@@ -137,22 +149,25 @@ def identify_modes(
     Examples
     --------
     >>> with open_log("arm.mcap") as log:  # doctest: +SKIP
-    ...     modes = identify_modes(log, reference="/shaker.wrench.force.x", band_hz=(10, 400))
+    ...     modes = identify_modes(log, references="/shaker.wrench.force.x", band_hz=(10, 400))
     """
     wanted = Wanted.of(bands_hz=_bands(band_hz), count=count, frequencies_hz=frequencies_hz)
     span, averaging = Span(start_s=start_s, end_s=end_s), Averaging(resolution_hz=resolution_hz)
-    if isinstance(source, FrequencyResponse):
-        return modes_of_response(over_hit_points(source), method=method, wanted=wanted)
     if isinstance(source, CrossSpectra):
         return modes_of_spectra(source, method=method, wanted=wanted)
+    if isinstance(source, FrequencyResponse) or frequency_hz is not None:
+        given = response_of(source, frequency_hz=frequency_hz)
+        return modes_of_response(over_hit_points(given), method=method, wanted=wanted)
+    source = log_or_series(source, sample_rate_hz=sample_rate_hz)
+    named = None if responses is None else as_names(responses)
     if isinstance(source, Log) and not source.channels and source.functions is None and source.modes is not None:
         return source.modes
     if operational or isinstance(method, FromResponses):
         return modes_of_responses(
-            source, channels=channels, method=method, wanted=wanted, averaging=averaging, span=span
+            source, channels=named, method=method, wanted=wanted, averaging=averaging, span=span
         )
     return functions_and_modes(
-        source, reference, channels, method=method, wanted=wanted, averaging=averaging, span=span
+        source, references, named, method=method, wanted=wanted, averaging=averaging, span=span
     )[1]
 
 
@@ -210,7 +225,7 @@ def modes_of_responses(
 
 def functions_and_modes(
     source: Log | TimeSeries,
-    reference: str | Sequence[str] | None,
+    reference: Names | None,
     channels: Sequence[str] | None,
     *,
     method: Method | None,
@@ -230,13 +245,13 @@ def functions_and_modes(
     EstimateError
         When no excitation is named and none can be told.
     """
-    named = (reference,) if isinstance(reference, str) else reference
+    named = None if reference is None else as_names(reference)
     stored = stored_functions(source, named, channels)
     if stored is not None:
         held = transfer(source, named, channels, estimator="H1", averaging=averaging, span=span)
         response = over_hit_points(_of_one_form(held))
         return response, modes_of_response(response, method=method, wanted=wanted)
-    references = excitation_names(source, span, otherwise=ALONE) if named is None else tuple(named)
+    references = excitation_names(source, span, otherwise=ALONE) if named is None else named
     coarse = _functions(source, references, channels, wanted, averaging, span, progress)
     finer = _modal_averaging(coarse, averaging)
     if finer == averaging:

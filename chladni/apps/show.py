@@ -1,52 +1,74 @@
 """Show results in rerun."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 from chladni.apps.analyse import analyse
+from chladni.apps.gap_evidence import gap_evidence
 from chladni.apps.unit_peaks import unit_peaks
+from chladni.gap.records.diagnosis import Diagnosis
 from chladni.io.log import Log
 from chladni.modal.shapes.relative_motion import relative_motion
 from chladni.modal.shapes.summary import summarise
 from chladni.modal.shapes.validation import validate
+from chladni.models.core.simulation import Simulation
+from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.value import Drawn
 from chladni.signals.waterfall import Waterfall
 from chladni.spectral.peaks import find_response_peaks
+from chladni.spectral.power_spectral_density import power_spectral_density
 
-Analysed = Study | TimeSeries | PowerSpectralDensity | FrequencyResponse | Waterfall | ModeSet
-Shown = Log | Analysed
+Shown = Log | Drawn | Path | str
 
 # Title of a study that no log has given its name yet.
 NAMELESS = "chladni"
 
 
-def show(*items: Shown) -> None:
-    """Open the rerun viewer with logs, series, spectra, transfer functions and modes side by side.
+def show(*items: Shown, save: Path | str | None = None) -> None:
+    """Show logs, series, spectra, transfer functions, modes and every other value side by side in rerun.
 
     Parameters
     ----------
     items
-        A log is analysed first; all else is shown as it is.
+        A log, or the path to one, is analysed first. What has no view of its own is shown as its picture.
+    save
+        File ``.rrd`` to write instead of opening the viewer.
 
     Raises
     ------
     SetupError
         When there is nothing to show, or the viewer doesn't start, as on a computer without a display.
+    LogError
+        When the file can't be written, or a log can't be read.
     """
-    from chladni.viewers.rerun import spawn
+    from chladni.viewers import rerun
 
-    spawn(gather(*items))
+    if len(items) == 1 and isinstance(items[0], Diagnosis):
+        evidence = gap_evidence(items[0])
+        if save is None:
+            rerun.spawn_gap(evidence)
+        else:
+            rerun.write_gap_rrd(evidence, save)
+        return
+    study = gather(*items)
+    if save is None:
+        rerun.spawn(study)
+    else:
+        rerun.write_rrd(study, save)
 
 
 def gather(*items: Shown) -> Study:
     """Put items into one study; later functions or modes replace earlier ones, with a finding that says so."""
     if not items:
         raise SetupError("nothing to show; give a log, a series, a spectrum, a transfer function or modes")
-    studies = [analyse(item) if isinstance(item, Log) else item for item in items]
+    studies = [analyse(item) if isinstance(item, Log | Path | str) else item for item in items]
     several = sum(isinstance(item, Study) for item in studies) > 1
     study = Study(title=NAMELESS)
     for item in studies:
@@ -60,7 +82,7 @@ def _labelled(study: Study) -> Study:
     return replace(study, findings=tuple(f"{study.title}: {finding}" for finding in study.findings))
 
 
-def _with(study: Study, item: Analysed) -> Study:
+def _with(study: Study, item: Drawn) -> Study:
     match item:
         case Study():
             return _joined(study, item)
@@ -75,6 +97,23 @@ def _with(study: Study, item: Analysed) -> Study:
             return replace(study, response=item, response_peaks=find_response_peaks(item))
         case ModeSet():
             return replace(study, modes=item, validation=None)
+        case CrossSpectra() | AutoSpectra():
+            return _with(study, power_spectral_density(item))
+        case Simulation():
+            return _with(_with(study, item.inputs), item.outputs)
+        case _:
+            return replace(study, pictures=(*study.pictures, _picture(item)))
+
+
+def _picture(item: object) -> tuple[str, bytes]:
+    """Give the title and the picture of what has no view of its own."""
+    # matplotlib takes half a second, which most of what is shown does without.
+    from chladni.apps.plot import png
+
+    drawn = png(item) if isinstance(item, Drawn) else None
+    if drawn is None:
+        raise SetupError(f"a {type(item).__name__} can't be shown; give a log, its path, or a value with a picture")
+    return re.sub("(?<=[a-z])(?=[A-Z])", " ", type(item).__name__).capitalize(), drawn
 
 
 def _with_checks(study: Study, modes: ModeSet) -> Study:
@@ -113,4 +152,5 @@ def _joined(first: Study, second: Study) -> Study:
         relative_motion=modal.relative_motion,
         geometry=second.geometry if second.geometry.points else first.geometry,
         findings=(*first.findings, *second.findings, *replaced),
+        pictures=(*first.pictures, *second.pictures),
     )

@@ -129,7 +129,9 @@ def simulate_log(model: Model, drive: Drive, *, seconds: float | None = None, ra
         run = default_run(compiled, seconds=seconds, rate_hz=rate_hz)
         name = _input_name(model, compiled, drive.input_name)
         signal = excitation(drive.word, run, level=drive.level, band_hz=drive.band_hz)
-        done = simulate(model, {name: signal}, seconds=run.seconds, rate_hz=run.sample_rate_hz, seed=drive.seed)
+        done = simulate(
+            model, {name: signal}, duration_s=run.seconds, sample_rate_hz=run.sample_rate_hz, seed=drive.seed
+        )
         told = {"kind": drive.word, "input": name, "level": drive.level, "definition": str(signal)}
     recorded = _recorded(done, drive)
     if recording is None:

@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 
 from chladni.io.log import Log
 from chladni.io.log_reader import MostlyEmptyError, several_grids
+from chladni.io.source import block_seconds, is_small
 from chladni.signals.errors import LogError
 from chladni.signals.resampling import JoinMethod, join_note, join_resampled
 from chladni.signals.time_series import TimeSeries
 
 Progress = Callable[[float], None]
-
-# A compressed log of this size holds at most some tens of millions of samples.
-IN_MEMORY_BYTES = 48 << 20
-VALUES_IN_A_BLOCK = 1 << 21
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,11 +25,6 @@ class Span:
     start_s: float | None = None
     end_s: float | None = None
     join: JoinMethod = "auto"
-
-
-def is_small(log: Log) -> bool:
-    """Whether all samples of a log may be held in memory at once, once more where they are in memory already."""
-    return log.size_bytes <= IN_MEMORY_BYTES
 
 
 def no_progress(share: float) -> None:
@@ -114,7 +106,7 @@ def watched_grids(
                 yield Watched(names, (series,), duration_s=series.duration_s, progress=progress)
             return
     for grid in log.grids(channels, start_s=span.start_s, end_s=span.end_s):
-        seconds = max(1.0, VALUES_IN_A_BLOCK / (len(grid.names) * grid.sample_rate_hz))
+        seconds = block_seconds(len(grid.names), grid.sample_rate_hz)
         blocks = log.blocks(grid.names, seconds=seconds, start_s=span.start_s, end_s=span.end_s)
         yield Watched(grid.names, blocks, duration_s=grid.duration_s, progress=progress)
 

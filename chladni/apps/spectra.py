@@ -10,11 +10,14 @@ from chladni.apps.excitation import excitation_names, stored_functions
 from chladni.apps.sources import Progress, Span, Watched, no_progress, on_one_grid, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
+from chladni.io.source import SeriesLike, log_or_series
+from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
+from chladni.signals.renamed import renamed
 from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import rounded_up
@@ -62,9 +65,10 @@ class Averaging:
 
 
 def psd(
-    source: Log | TimeSeries,
+    source: SeriesLike,
     *,
-    channels: Sequence[str] | None = None,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
     resolution_hz: float | None = None,
     window: Window | None = None,
     overlap: float | None = None,
@@ -76,10 +80,12 @@ def psd(
     Parameters
     ----------
     source
-        A log (read block by block when it's large) or a series.
+        A log (read block by block when it's large), the path to one, a series, or an array ``[channel, sample]``.
     channels
         Message paths or names; None for all that share one sampling grid. Channels of a log that never change are
         left out, with a note.
+    sample_rate_hz
+        Samples a second of an array, or of a file that doesn't say it.
     resolution_hz
         Distance of the lines; None chooses by the length of the record.
     window
@@ -105,21 +111,21 @@ def psd(
     Examples
     --------
     >>> import numpy as np
-    >>> from chladni.signals.channel import Channel
-    >>> noise = np.random.default_rng(1).standard_normal((1, 2**16))
-    >>> series = TimeSeries(values=noise, sample_rate_hz=2.0, channels=(Channel(name="a", unit="m/s^2"),))
-    >>> density = psd(series)  # white noise of variance 1 up to 1 Hz: density 1
-    >>> density.units, bool(abs(density.values.mean() - 1) < 0.02)
-    (('(m/s^2)^2/Hz',), True)
+    >>> noise = np.random.default_rng(1).standard_normal(2**16)
+    >>> density = psd(noise, sample_rate_hz=2.0)  # white noise of variance 1 up to 1 Hz: density 1
+    >>> bool(abs(density.values.mean() - 1) < 0.02)
+    True
     """
+    source = log_or_series(source, sample_rate_hz=sample_rate_hz)
+    names = None if channels is None else as_names(channels)
     averaging = Averaging(resolution_hz=resolution_hz, window=window, overlap=overlap)
     span = Span(start_s=start_s, end_s=end_s)
     if isinstance(source, TimeSeries):
-        return _density(_of_series(source, channels, span), averaging)
-    grids = list(watched_grids(source, channels, span))
+        return _density(_of_series(source, names, span), averaging)
+    grids = list(watched_grids(source, names, span))
     if len(grids) > 1:
         # The log's own error names the grids and the remedies.
-        source.read(channels, start_s=start_s, end_s=end_s)
+        source.read(names, start_s=start_s, end_s=end_s)
     return _density(grids[0], averaging)
 
 
@@ -153,15 +159,17 @@ def densities(
     return (noted, *found[1:])
 
 
+@renamed(reference="references", response="responses")
 def frf(
-    source: Log | TimeSeries,
+    source: SeriesLike,
     *,
-    reference: str | Sequence[str] | None = None,
-    response: str | Sequence[str] | None = None,
+    references: Names | None = None,
+    responses: Names | None = None,
     estimator: Estimator = "H1",
     resolution_hz: float | None = None,
     window: Window | None = None,
     overlap: float | None = None,
+    sample_rate_hz: float | None = None,
     start_s: float | None = None,
     end_s: float | None = None,
     join: JoinMethod = "auto",
@@ -175,15 +183,15 @@ def frf(
     Parameters
     ----------
     source
-        A log (read block by block when it's large) or a series.
-    reference
+        A log (read block by block when it's large), the path to one, a series, or an array ``[channel, sample]``.
+    references
         Message path of the excitation, or several; None takes those whose role is reference, else the first force.
-    response
+    responses
         Message paths of the responses; None for all other channels that share the reference's sampling grid and
         change at all.
     estimator
         ``H1``, ``H2`` or ``Hv``, see `frequency_response`.
-    resolution_hz, window, overlap, start_s, end_s
+    resolution_hz, window, overlap, sample_rate_hz, start_s, end_s
         See `psd`. For a hammer test the resolution sets the length of a record.
     join
         How named channels of several sampling grids become one, see `chladni.signals.resampling.join_resampled`; a
@@ -204,24 +212,17 @@ def frf(
     Examples
     --------
     >>> import numpy as np
-    >>> from chladni.signals.channel import Channel
     >>> force = np.random.default_rng(1).standard_normal(2**14)
-    >>> series = TimeSeries(
-    ...     values=np.stack([force, 0.5 * force]),
-    ...     sample_rate_hz=100.0,
-    ...     channels=(Channel(name="f", unit="N"), Channel(name="a", unit="m/s^2")),
-    ... )
-    >>> response = frf(series, reference="f", resolution_hz=1.0)
-    >>> response.unit(0, 0), float(abs(response.values[0, 0, 10]).round(12))
-    ('(m/s^2)/N', 0.5)
+    >>> response = frf({"f": force, "a": 0.5 * force}, sample_rate_hz=100.0, references="f", resolution_hz=1.0)
+    >>> float(abs(response.values[0, 0, 10]).round(12))
+    0.5
     """
-    references = (reference,) if isinstance(reference, str) else reference
-    responses = (response,) if isinstance(response, str) else response
+    source = log_or_series(source, sample_rate_hz=sample_rate_hz)
     averaging = Averaging(resolution_hz=resolution_hz, window=window, overlap=overlap)
     return transfer(
         source,
-        references,
-        responses,
+        None if references is None else as_names(references),
+        None if responses is None else as_names(responses),
         estimator=estimator,
         averaging=averaging,
         span=Span(start_s=start_s, end_s=end_s, join=join),

@@ -73,8 +73,8 @@ def excite(
     with to.progress(robot.name) as progress:
         made = exciting(
             described,
-            length_s=length,
-            rate_hz=rate,
+            duration_s=length,
+            sample_rate_hz=rate,
             harmonics=harmonics,
             base_frequency_hz=base_frequency,
             joints=[one.strip() for one in joints.split(",")] if joints is not None else (),

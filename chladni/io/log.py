@@ -13,7 +13,7 @@ from chladni.io.loss import Loss, Unread
 from chladni.io.mcap.limits import Limits
 from chladni.io.setup import Setup, load_setup
 from chladni.io.stamps import StampRequest
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, Names, as_names
 from chladni.signals.errors import LogError
 from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import TimeSeries
@@ -163,7 +163,7 @@ class Log(ABC):
 
     def read(
         self,
-        paths: Sequence[str] | None = None,
+        paths: Names | None = None,
         *,
         start_s: float | None = None,
         end_s: float | None = None,
@@ -175,8 +175,8 @@ class Log(ABC):
         Parameters
         ----------
         paths
-            Message paths, or names of the channels of a data file; None for every channel listed whose samples are
-            uniform.
+            Message paths, or names of the channels of a data file, one or several; None for every channel listed
+            whose samples are uniform.
         start_s, end_s
             Only samples with ``start_s <= t < end_s``, seconds from the log's start.
         sample_rate_hz
@@ -197,6 +197,7 @@ class Log(ABC):
             When there is no such channel, its samples are events rather than a uniform series, channels don't share
             a grid and no rate is given, their clocks were set at different times, or the window holds no sample.
         """
+        paths = None if paths is None else as_names(paths)
         groups = self.read_groups(paths, start_s=start_s, end_s=end_s, one_clock=True)
         if sample_rate_hz is not None or (join is not None and len(groups) > 1):
             # Resampling brings in scipy's filters, which a plain read does without.

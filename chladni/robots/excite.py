@@ -20,6 +20,7 @@ from chladni.robots.trajectory import FourierSeries, JointUse, Trajectory
 from chladni.signals.arrays import Index, Real
 from chladni.signals.errors import ModelError, SetupError
 from chladni.signals.linear_algebra import in_one_thread
+from chladni.signals.renamed import renamed
 
 #: Samples of a period over its harmonics: while a motion is sought, and where its limits are kept.
 _COARSE, _FINE = 8, 64
@@ -45,12 +46,13 @@ UNCHECKED: Final = (
 )
 
 
+@renamed(length_s="duration_s", rate_hz="sample_rate_hz")
 @in_one_thread()
 def excite(
     robot: Robot | Path | str,
     *,
-    length_s: float = 10.0,
-    rate_hz: float = 250.0,
+    duration_s: float = 10.0,
+    sample_rate_hz: float = 250.0,
     harmonics: int = HARMONICS,
     base_frequency_hz: float | None = None,
     joints: Iterable[str] = (),
@@ -72,9 +74,9 @@ def excite(
     ----------
     robot
         Loaded, or its file: MJCF, URDF or robot file.
-    length_s
+    duration_s
         Whole periods.
-    rate_hz
+    sample_rate_hz
         Samples a second.
     harmonics
         2 to 20.
@@ -110,7 +112,7 @@ def excite(
     True
     """
     chosen = robot if isinstance(robot, Robot) else load_robot(robot, meshes=False)
-    series = _series(length_s, rate_hz, harmonics, base_frequency_hz)
+    series = _series(duration_s, sample_rate_hz, harmonics, base_frequency_hz)
     shares = Shares(travel=travel, speed=speed, torque=torque)
     search, told = _begun(chosen, series, tuple(joints), pose or {}, shares)
     starts = search.random(np.random.default_rng(seed), _RANDOM)
@@ -118,9 +120,9 @@ def excite(
     found = search.optimised(judge, starts, progress or (lambda _: None))
     random = float(np.median([judge.condition(search.seen(one)) for one in starts]))
     condition = judge.condition(search.seen(found, fine=True))
-    samples = round(length_s * rate_hz) + 1
+    samples = round(duration_s * sample_rate_hz) + 1
     return replace(
-        search.trajectory(found, rate_hz, samples), condition=condition, random_condition=random,
+        search.trajectory(found, sample_rate_hz, samples), condition=condition, random_condition=random,
         parameters=int(judge.base.size), remarks=(*told, UNCHECKED),
     )  # fmt: skip
 

@@ -1,15 +1,22 @@
 """A channel: one measured quantity at one place in one direction."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import frexp, inf, isfinite, ldexp, sqrt
-from typing import Literal, Self
+from typing import Final, Literal, Self
 
 from chladni.signals.errors import EstimateError, SetupError
+from chladni.signals.units import si_factor
 from chladni.signals.visible import place_of
-from chladni.signals.wording import shown
+from chladni.signals.wording import counted, shown
 
 Role = Literal["response", "reference"]
+#: One channel's name, or several.
+Names = str | Iterable[str]
+#: One unit of all channels, one of each, or by their names.
+Units = str | Sequence[str] | Mapping[str, str]
+UNKNOWN: Final = "1"
+"""Unit of a channel of which nothing is said."""
 Vector = tuple[float, float, float]
 
 AXES: dict[str, Vector] = {
@@ -48,7 +55,7 @@ class Channel:
     """
 
     name: str
-    unit: str = "1"
+    unit: str = UNKNOWN
     point: str | None = None
     direction: Vector | None = None
     role: Role = "response"
@@ -61,6 +68,17 @@ class Channel:
         return replace(self, name=name)
 
 
+def as_names(names: Names) -> tuple[str, ...]:
+    """Give one name or several as several.
+
+    Examples
+    --------
+    >>> as_names("/imu.x"), as_names(["/imu.x", "/imu.y"])
+    (('/imu.x',), ('/imu.x', '/imu.y'))
+    """
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
 def find_channel(channels: Sequence[Channel], name: str, *, role: str = "channel") -> int:
     """Row of the channel that is called so or shown so; `EstimateError` naming those there are when it's missing."""
     names = [channel.name for channel in channels]
@@ -69,10 +87,66 @@ def find_channel(channels: Sequence[Channel], name: str, *, role: str = "channel
     raise EstimateError(f"no {role} {name!r}; {role}s: {', '.join(names)}")
 
 
-def find_channels(channels: Sequence[Channel], names: Iterable[str], *, role: str = "channel") -> list[int]:
+def find_channels(channels: Sequence[Channel], names: Names, *, role: str = "channel") -> list[int]:
     """Rows of the channels, each as `find_channel` finds it, in one look at all of them."""
     rows = {channel.name: row for row, channel in reversed(list(enumerate(channels)))}
-    return [rows[name] if name in rows else find_channel(channels, name, role=role) for name in names]
+    return [rows[name] if name in rows else find_channel(channels, name, role=role) for name in as_names(names)]
+
+
+def numbered(prefix: str, count: int, names: Names | None = None) -> tuple[str, ...]:
+    """Give names for so many channels: those given, else ``ch1``, ``ch2``, ... of the prefix ``ch``.
+
+    Raises
+    ------
+    EstimateError
+        When names are given, but not so many.
+    """
+    if names is None:
+        return tuple(f"{prefix}{number}" for number in range(1, count + 1))
+    given = as_names(names)
+    if len(given) != count:
+        raise EstimateError(f"{counted(len(given), 'name')} for {counted(count, 'channel')}; name each channel")
+    return given
+
+
+def made_channels(
+    names: Sequence[str], units: Units, *, references: Names = ()
+) -> tuple[tuple[Channel, ...], tuple[float, ...]]:
+    """Make channels of names and units, and give the factor that turns the numbers of each into SI.
+
+    Raises
+    ------
+    EstimateError
+        When there isn't a unit for each name, or one is given for a name that isn't there.
+    SetupError
+        When a unit isn't known.
+
+    Examples
+    --------
+    >>> (channel,), factors = made_channels(["a"], "g")
+    >>> channel.unit, factors
+    ('m/s^2', (9.80665,))
+    """
+    marked = as_names(references)
+    for what, named in (("reference", marked), ("unit of", units if isinstance(units, Mapping) else ())):
+        if strangers := sorted(set(named).difference(names)):
+            raise EstimateError(f"{what} {', '.join(strangers)}: no such channel; channels: {', '.join(names)}")
+    scaled = [si_factor(unit) for unit in _units_of(names, units)]
+    channels = tuple(
+        Channel(name=name, unit=unit, role="reference" if name in marked else "response")
+        for name, (_, unit) in zip(names, scaled, strict=True)
+    )
+    return channels, tuple(factor for factor, _ in scaled)
+
+
+def _units_of(names: Sequence[str], units: Units) -> Sequence[str]:
+    if isinstance(units, str):
+        return [units] * len(names)
+    if isinstance(units, Mapping):
+        return [units.get(name, UNKNOWN) for name in names]
+    if len(units) != len(names):
+        raise EstimateError(f"{counted(len(units), 'unit')} for {counted(len(names), 'channel')}; give one for each")
+    return units
 
 
 def unit_direction(direction: str | Iterable[float]) -> Vector:

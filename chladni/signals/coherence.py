@@ -1,7 +1,7 @@
 """Coherence between channels."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
@@ -30,6 +30,9 @@ class Coherence(Value):
     provenance
         How it was made.
     """
+
+    AXES: ClassVar = {"values": ("responses", "frequency_hz"), "std": ("responses", "frequency_hz")}
+    ROWS: ClassVar = "frequency_hz"
 
     frequency_hz: Real
     values: Real

@@ -1,16 +1,16 @@
 """Averaged spectra, from which every estimate is derived: of all pairs of channels, or of each channel alone."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.arrays import Real
-from chladni.signals.channel import Channel, find_channel, find_channels
+from chladni.signals.channel import Channel, Names, find_channel, find_channels
 from chladni.signals.provenance import Provenance
-from chladni.signals.value import Value, require_frequency_axis, require_shape
+from chladni.signals.units import power_density_unit, product, quotient
+from chladni.signals.value import Coordinate, Value, require_frequency_axis, require_shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,6 +35,9 @@ class CrossSpectra(Value):
         How it was made.
     """
 
+    AXES: ClassVar = {"density": ("channels", "channels_b", "frequency_hz")}
+    ROWS: ClassVar = "frequency_hz"
+
     frequency_hz: Real
     density: NDArray[np.complexfloating]
     channels: tuple[Channel, ...]
@@ -51,7 +54,7 @@ class CrossSpectra(Value):
             require_shape("noise_density", self.noise_density, expected, "channels x channels x frequencies")
         self._freeze()
 
-    def select(self, names: Sequence[str]) -> Self:
+    def select(self, names: Names) -> Self:
         """Give the spectra of the named channels and their pairs, in the order asked for."""
         rows = find_channels(self.channels, names)
         pairs = np.ix_(rows, rows)
@@ -61,6 +64,15 @@ class CrossSpectra(Value):
             noise_density=None if self.noise_density is None else self.noise_density[pairs],
             channels=tuple(self.channels[row] for row in rows),
         )
+
+    def coordinate(self, axis: str) -> Coordinate:
+        """Give the frequencies, or the names of the channels, which run along two axes."""
+        return Value.coordinate(self, axis.removesuffix("_b"))
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a pair of channels."""
+        one, other = (self.channels[row].unit for row in place)
+        return quotient(product(one, other), "Hz")
 
     def index(self, name: str) -> int:
         """Row of the named channel; `EstimateError` naming those there are when it's missing."""
@@ -79,6 +91,9 @@ class AutoSpectra(Value):
         See `CrossSpectra`.
     """
 
+    AXES: ClassVar = {"density": ("channels", "frequency_hz")}
+    ROWS: ClassVar = "frequency_hz"
+
     frequency_hz: Real
     density: Real
     channels: tuple[Channel, ...]
@@ -93,3 +108,7 @@ class AutoSpectra(Value):
         if self.noise_density is not None:
             require_shape("noise_density", self.noise_density, expected, "channels x frequencies")
         self._freeze()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a density."""
+        return power_density_unit(self.channels[place[0]].unit)

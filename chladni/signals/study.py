@@ -10,11 +10,12 @@ from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.relative_motion import RelativeMotion
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.value import Drawn
 from chladni.signals.waterfall import Waterfall
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Study:
+class Study(Drawn):
     """Results of one analysis, ready to be drawn.
 
     Attributes
@@ -43,6 +44,8 @@ class Study:
         Where the points sit; empty when no setup file was given.
     findings
         Sentences about the log and its spectra: soundness first, then what was seen, then advice.
+    pictures
+        Titles and PNGs of what has no place of its own above.
     """
 
     title: str
@@ -57,3 +60,4 @@ class Study:
     relative_motion: tuple[RelativeMotion, ...] = ()
     geometry: Geometry = field(default_factory=Geometry)
     findings: tuple[str, ...] = ()
+    pictures: tuple[tuple[str, bytes], ...] = ()

@@ -1,19 +1,22 @@
 """Uniformly sampled channels on one clock."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chladni.signals.arrays import Mask, Real, Whole
-from chladni.signals.channel import Channel, find_channel
+from chladni.signals.channel import UNKNOWN, Channel, Names, Units, as_names, find_channel, made_channels, numbered
 from chladni.signals.errors import EstimateError
-from chladni.signals.value import Value, require_shape
+from chladni.signals.value import Coordinate, Value, require_shape
+from chladni.signals.wording import counted
 
 NS_PER_S = 1_000_000_000
+#: Numbers of one channel or of several, ``[channel, sample]``, or those of each channel by its name.
+Arrays = ArrayLike | Mapping[str, ArrayLike]
 _CENTURIES_NS = 2**63
 """What nanoseconds of 64 bits count to, either way from 1970."""
 
@@ -59,6 +62,9 @@ class TimeSeries(Value):
     0.5
     """
 
+    AXES: ClassVar = {"values": ("channels", "time_s")}
+    ROWS: ClassVar = "time_s"
+
     values: NDArray[np.floating]
     sample_rate_hz: float
     channels: tuple[Channel, ...]
@@ -92,6 +98,64 @@ class TimeSeries(Value):
             raise EstimateError(f"channel names must be unique, got {', '.join(names)}")
         self._freeze()
 
+    @classmethod
+    def from_arrays(
+        cls,
+        values: Arrays,
+        *,
+        sample_rate_hz: float,
+        names: Names | None = None,
+        units: Units = UNKNOWN,
+        references: Names = (),
+        start_time_ns: int = 0,
+    ) -> Self:
+        """Make a series of numbers in memory.
+
+        Parameters
+        ----------
+        values
+            ``[channel, sample]``, ``[sample]`` of one channel, or the samples of each channel by its name. NaN is a
+            sample that is missing, and is marked so.
+        sample_rate_hz
+            Samples a second.
+        names
+            Of the channels; ``ch1``, ``ch2``, ... by default.
+        units
+            Of all channels, of each, or by name; values are converted to SI: of ``g`` they become ``m/s^2``. ``1``,
+            the default, is a unit that isn't known.
+        references
+            Names of the channels that excite.
+        start_time_ns
+            Time of the first sample, nanoseconds since the Unix epoch.
+
+        Raises
+        ------
+        EstimateError
+            When the values are no real numbers of that shape, or names and units don't fit them.
+        SetupError
+            When a unit isn't known.
+
+        Examples
+        --------
+        >>> arrays = {"f": [1.0, 2.0], "a": [0.0, 1.0]}
+        >>> series = TimeSeries.from_arrays(arrays, sample_rate_hz=100.0, units={"a": "g"})
+        >>> [(channel.name, channel.unit) for channel in series.channels], float(series.values[1, 1])
+        ([('f', '1'), ('a', 'm/s^2')], 9.80665)
+        """
+        table, given = _table(values, None if names is None else as_names(names))
+        channels, factors = made_channels(given, units, references=references)
+        # Not multiplied by one: a gigabyte is viewed, not copied.
+        if any(factor != 1 for factor in factors):
+            table = table * np.array(factors)[:, np.newaxis]
+        missing = np.isnan(table)
+        return cls(
+            values=table,
+            sample_rate_hz=sample_rate_hz,
+            channels=channels,
+            start_time_ns=start_time_ns,
+            valid=~missing if missing.any() else None,
+        )
+
     @property
     def samples(self) -> int:
         """Samples of each channel."""
@@ -101,6 +165,14 @@ class TimeSeries(Value):
     def duration_s(self) -> float:
         """Number of samples over the rate."""
         return self.samples / self.sample_rate_hz
+
+    def coordinate(self, axis: str) -> Coordinate:
+        """Give the seconds since the first sample, or the names of the channels."""
+        return self.times_s() if axis == "time_s" else Value.coordinate(self, axis)
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a channel."""
+        return self.channels[place[0]].unit
 
     def times_s(self) -> Real:
         """Seconds of each sample since the first, computed from the index so that no error adds up."""
@@ -116,9 +188,9 @@ class TimeSeries(Value):
         """Row of the named channel; `EstimateError` naming the channels there are when it's missing."""
         return find_channel(self.channels, name)
 
-    def select(self, names: Sequence[str]) -> Self:
+    def select(self, names: Names) -> Self:
         """Give the named channels, in the order asked for."""
-        rows = [self.index(name) for name in names]
+        rows = [self.index(name) for name in as_names(names)]
         valid = None if self.valid is None else self.valid[rows]
         return replace(
             self, values=self.values[rows], valid=valid, channels=tuple(self.channels[row] for row in rows)
@@ -150,3 +222,34 @@ class TimeSeries(Value):
     def _sample_at(self, time_s: float) -> int:
         # A time within a thousandth of a sample of the grid means that sample, whatever floating point says.
         return int(np.clip(np.ceil(time_s * self.sample_rate_hz - 1e-3), 0, self.samples))
+
+
+def _table(values: Arrays, names: tuple[str, ...] | None) -> tuple[NDArray[np.floating], tuple[str, ...]]:
+    """Give numbers as ``[channel, sample]``, and the name of each channel."""
+    if isinstance(values, Mapping):
+        if names is not None:
+            raise EstimateError("values come with names already; leave names out")
+        names, values = tuple(map(str, values)), [np.ravel(one) for one in values.values()]
+    table = np.atleast_2d(_real(values))
+    if table.ndim != 2 or not table.size:
+        raise EstimateError(
+            f"values have shape {table.shape}, but must be [channel, sample], or [sample] of one channel"
+        )
+    count, samples = table.shape
+    # Records are longer than they're wide; the other way round time runs down the rows.
+    if count > samples and (names is None or len(names) != count):
+        told = f"{counted(count, 'channel')} of {counted(samples, 'sample')}"
+        raise EstimateError(f"values are [channel, sample], so these are {told}; give values.T, or name each channel")
+    return table, numbered("ch", count, names)
+
+
+def _real(values: ArrayLike | Iterable[ArrayLike]) -> NDArray[np.floating]:
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise EstimateError("values must be [channel, sample], with as many samples in each channel") from error
+    if array.dtype.kind in "iub":
+        return array.astype(np.float64)
+    if not np.issubdtype(array.dtype, np.floating):
+        raise EstimateError(f"values are of type {array.dtype}, but samples are real numbers")
+    return array

@@ -1,6 +1,7 @@
 """Spectra over time."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.provenance import Provenance
+from chladni.signals.units import power_density_unit
 from chladni.signals.value import Value, require_frequency_axis, require_shape
 
 
@@ -34,6 +36,9 @@ class Waterfall(Value):
         How it was made.
     """
 
+    AXES: ClassVar = {"values": ("channels", "time_s", "frequency_hz")}
+    ROWS: ClassVar = "time_s"
+
     time_s: Real
     frequency_hz: Real
     values: NDArray[np.floating]
@@ -49,3 +54,7 @@ class Waterfall(Value):
         expected = (len(self.channels), self.time_s.size, self.frequency_hz.size)
         require_shape("values", self.values, expected, "channels x times x frequencies")
         self._freeze()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a channel's densities."""
+        return power_density_unit(self.channels[place[0]].unit)

@@ -1,8 +1,8 @@
 """Which channels are references and which responses."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
+from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 
@@ -15,9 +15,7 @@ class ChannelChoice:
     responses: list[int]
 
 
-def choose_channels(
-    spectra: CrossSpectra, references: str | Sequence[str], responses: str | Sequence[str] | None
-) -> ChannelChoice:
+def choose_channels(spectra: CrossSpectra, references: Names, responses: Names | None) -> ChannelChoice:
     """Find the named channels; responses default to all channels that are no reference.
 
     Raises
@@ -30,11 +28,11 @@ def choose_channels(
         raise EstimateError(
             "a peak hold keeps no phase between channels; average linearly for responses and coherence"
         )
-    inputs = _as_names(references)
+    inputs = as_names(references)
     outputs = (
         tuple(channel.name for channel in spectra.channels if channel.name not in inputs)
         if responses is None
-        else _as_names(responses)
+        else as_names(responses)
     )
     # A response may be a reference too (its row is then a column of ones and zeros), but none is asked for twice.
     for role, names in (("reference", inputs), ("response", outputs)):
@@ -48,7 +46,3 @@ def choose_channels(
     return ChannelChoice(
         references=[spectra.index(name) for name in inputs], responses=[spectra.index(name) for name in outputs]
     )
-
-
-def _as_names(names: str | Sequence[str]) -> tuple[str, ...]:
-    return (names,) if isinstance(names, str) else tuple(names)

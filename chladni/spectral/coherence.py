@@ -4,32 +4,48 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from chladni.io.source import Blocks, SeriesLike
 from chladni.signals.arrays import Real
+from chladni.signals.channel import Names, as_names
 from chladni.signals.coherence import Coherence
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.spectral.channel_choice import choose_channels
+from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.line_algebra import conditioned_density, solve_lines
 from chladni.spectral.power_spectral_density import auto_densities
 from chladni.spectral.uncertainty import coherence_std
+from chladni.spectral.windows import Window
 
 # What is left of a channel after its own double was taken out is rounding: not more than this share of its power.
 ROUNDING = 1e-12
 
 
 def coherence(
-    spectra: CrossSpectra, *, references: str | Sequence[str], responses: str | Sequence[str] | None = None
+    source: CrossSpectra | SeriesLike | Blocks,
+    *,
+    references: Names,
+    responses: Names | None = None,
+    resolution_hz: float | None = None,
+    window: Window = "hann",
+    overlap: float = 0.5,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> Coherence:
     """Give the share of each response's power that is linearly due to the references.
 
     Parameters
     ----------
-    spectra
-        Averaged cross-spectra.
+    source
+        Averaged cross-spectra; or a log, the path to one, a series or an array ``[channel, sample]``, whose
+        cross-spectra are averaged after Welch first.
     references
         Names of the excitations: one gives the ordinary coherence |G_xy|^2/(G_xx G_yy) (Bendat & Piersol 2010,
         chapter 6), several the multiple coherence G_xy^H G_xx^-1 G_xy / G_yy (chapter 7).
     responses
         Names of the responses; None takes all other channels.
+    resolution_hz, window, overlap, sample_rate_hz, start_s, end_s
+        Of samples: how they are averaged, see `cross_spectra`.
 
     Returns
     -------
@@ -40,7 +56,28 @@ def coherence(
     ------
     EstimateError
         When a channel is missing or named twice, or the spectra are peak-held.
+
+    Examples
+    --------
+    >>> x, noise = np.random.default_rng(1).standard_normal((2, 2**14))
+    >>> found = coherence({"x": x, "y": x + noise}, references="x", sample_rate_hz=1000.0)  # as much noise as signal
+    >>> float(found.values.mean().round(1))
+    0.5
     """
+    if isinstance(source, CrossSpectra):
+        spectra = source
+    else:
+        named = None if responses is None else dict.fromkeys((*as_names(references), *as_names(responses)))
+        spectra = cross_spectra(
+            source,
+            channels=named,
+            resolution_hz=resolution_hz,
+            window=window,
+            overlap=overlap,
+            sample_rate_hz=sample_rate_hz,
+            start_s=start_s,
+            end_s=end_s,
+        )
     chosen = choose_channels(spectra, references, responses)
     density = np.asarray(spectra.density, dtype=np.complex128)
     # One formula for both kinds: with one reference the explained power is |G_xy|^2/G_xx.

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from chladni.signals.channel import Channel
+from chladni.io.source import Blocks, SeriesLike, blocks_of
+from chladni.signals.channel import Channel, Names
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.linear_algebra import in_one_thread
 from chladni.spectral.accumulator import (
@@ -20,8 +21,12 @@ from chladni.spectral.windows import Window
 
 @in_one_thread()
 def cross_spectra(
-    source: Source,
+    source: SeriesLike | Blocks,
     *,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
     resolution_hz: float | None = None,
     window: Window = "hann",
     overlap: float = 0.5,
@@ -34,7 +39,14 @@ def cross_spectra(
     Parameters
     ----------
     source
-        A series, or consecutive blocks of one (taken one at a time, so memory doesn't grow with the log).
+        A log (read block by block when it's large), the path to one, a series, an array ``[channel, sample]``, or
+        consecutive blocks of a series.
+    channels
+        Message paths or names; None for all, which must share a sampling grid.
+    sample_rate_hz
+        Samples a second of an array, or of a file that doesn't say it.
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
     resolution_hz
         Spacing of the lines; None chooses, see `plan_segmentation`.
     window
@@ -62,21 +74,14 @@ def cross_spectra(
     Examples
     --------
     >>> import numpy as np
-    >>> from chladni.signals.channel import Channel
-    >>> from chladni.signals.time_series import TimeSeries
-    >>> time_s = np.arange(8000) / 1000
-    >>> series = TimeSeries(
-    ...     values=np.sqrt(2) * np.sin(2 * np.pi * 50 * time_s)[np.newaxis],
-    ...     sample_rate_hz=1000.0,
-    ...     channels=(Channel(name="a", unit="m/s^2"),),
-    ... )
-    >>> spectra = cross_spectra(series, resolution_hz=1.0)
+    >>> sine = np.sqrt(2) * np.sin(2 * np.pi * 50 * np.arange(8000) / 1000)
+    >>> spectra = cross_spectra(sine, sample_rate_hz=1000.0, resolution_hz=1.0)
     >>> float(round(spectra.density[0, 0, 50].real * spectra.bandwidth_hz, 12))  # RMS^2 of the sine
     1.0
     """
     return segment_average(
         partial(CrossSpectraAccumulator, averaging=averaging, time_constant_s=time_constant_s),
-        source,
+        blocks_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s),
         resolution_hz=resolution_hz,
         window=window,
         overlap=overlap,

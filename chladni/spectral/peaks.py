@@ -7,13 +7,16 @@ import numpy as np
 import scipy.ndimage
 import scipy.special
 from numpy.polynomial import Polynomial
+from numpy.typing import ArrayLike
 
+from chladni.io.source import density_of, response_of
 from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
+from chladni.signals.renamed import renamed
 from chladni.spectral.leakage import leakage, line_correlation, named_window
 from chladni.spectral.uncertainty import std_or_scatter
 from chladni.spectral.windows import noise_bandwidth_bins
@@ -67,9 +70,12 @@ class _Found:
     over_floor: float
 
 
+@renamed(density="source")
 def find_peaks(
-    density: PowerSpectralDensity,
+    source: PowerSpectralDensity | ArrayLike,
     *,
+    frequency_hz: ArrayLike | None = None,
+    averages: float | None = None,
     count: int = MOST_PEAKS,
     min_prominence_db: float = 3.0,
     false_alarm: float = 0.01,
@@ -78,8 +84,11 @@ def find_peaks(
 
     Parameters
     ----------
-    density
-        Of one or more channels; peaks that several channels show within the resolution get one name.
+    source
+        Densities of one or more channels, or an array ``[channel, frequency]`` of them; peaks that several channels
+        show within the resolution get one name.
+    frequency_hz, averages
+        Of an array: its frequencies, and the independent segments that were averaged, which its scatter follows from.
     count
         Most peaks to give, at least 1.
     min_prominence_db
@@ -97,7 +106,7 @@ def find_peaks(
     Raises
     ------
     EstimateError
-        When an argument is out of its range.
+        When an argument is out of its range, or the densities don't tell their random error.
 
     Notes
     -----
@@ -124,7 +133,11 @@ def find_peaks(
     >>> [round(peak.frequency_hz, 1) for peak in find_peaks(psd)]
     [80.2]
     """
+    density = density_of(source, frequency_hz=frequency_hz, averages=averages)
     _require(count, false_alarm)
+    # Without it a peak can't be told from scatter, and none would be found, in silence.
+    if not np.isfinite(density.std).any():
+        raise EstimateError("the densities don't tell their random error; give averages=, the segments averaged")
     curves = [_density_curve(density, row) for row in range(len(density.channels))]
     # Channel by channel, so that a strong channel's floor doesn't hide a weak one's peak.
     found = [_significant(curve, min_prominence_db, false_alarm) for curve in curves]
@@ -137,9 +150,11 @@ def find_peaks(
     return _merged(named, max(density.bandwidth_hz, resolution_hz), count)
 
 
+@renamed(response="source")
 def find_response_peaks(
-    response: FrequencyResponse,
+    source: FrequencyResponse | ArrayLike,
     *,
+    frequency_hz: ArrayLike | None = None,
     count: int = MOST_PEAKS,
     min_prominence_db: float = 3.0,
     false_alarm: float = 0.01,
@@ -148,8 +163,10 @@ def find_response_peaks(
 
     Parameters
     ----------
-    response
-        Functions in any form.
+    source
+        Functions in any form, or an array ``[response, reference, frequency]`` of them.
+    frequency_hz
+        Frequencies of an array.
     count
         Most peaks to give for each function, at least 1.
     min_prominence_db, false_alarm
@@ -167,6 +184,7 @@ def find_response_peaks(
     EstimateError
         When an argument is out of its range.
     """
+    response = response_of(source, frequency_hz=frequency_hz)
     _require(count, false_alarm)
     peaks = []
     for row, answer in enumerate(response.responses):

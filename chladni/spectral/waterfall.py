@@ -6,14 +6,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.source import Blocks, SeriesLike, blocks_of
 from chladni.signals.arrays import Real
+from chladni.signals.channel import Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import LARGEST, require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.waterfall import Waterfall
 from chladni.spectral.accumulator import line_frequencies_hz, one_sided_weights
-from chladni.spectral.blocks import Source, leading_part, samples_known
+from chladni.spectral.blocks import leading_part, samples_known
 from chladni.spectral.segment_spectra import segment_spectra
 from chladni.spectral.segmentation import SAMPLES_TO_CHOOSE_FROM, Detrend, Segmentation, plan_segmentation
 from chladni.spectral.windows import Window, noise_bandwidth_bins, window_name, window_samples
@@ -27,8 +29,12 @@ LONGEST_GAP_SAMPLES = 100_000_000
 
 
 def waterfall(
-    source: Source,
+    source: SeriesLike | Blocks,
     *,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
     resolution_hz: float | None = None,
     window: Window = "hann",
     overlap: float = 0.5,
@@ -40,7 +46,14 @@ def waterfall(
     Parameters
     ----------
     source
-        A series, or consecutive blocks of one (taken one at a time, so memory doesn't grow with the log).
+        A log (read block by block when it's large), the path to one, a series, an array ``[channel, sample]``, or
+        consecutive blocks of a series.
+    channels
+        Message paths or names; None for all, which must share a sampling grid.
+    sample_rate_hz
+        Samples a second of an array, or of a file that doesn't say it.
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
     resolution_hz
         Spacing of the lines; None chooses segments of a power of two, 2048 samples or a 16th of the record at most.
     window, overlap, detrend
@@ -66,17 +79,13 @@ def waterfall(
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
-    >>> series = TimeSeries(
-    ...     values=np.random.default_rng(1).standard_normal((1, 8000)),
-    ...     sample_rate_hz=1000.0,
-    ...     channels=(Channel(name="a", unit="N"),),
-    ... )
-    >>> waterfall(series, resolution_hz=10.0).values.shape
+    >>> noise = np.random.default_rng(1).standard_normal(8000)
+    >>> waterfall(noise, sample_rate_hz=1000.0, resolution_hz=10.0).values.shape
     (1, 159, 51)
     """
     if max_slices < 2:
         raise EstimateError(f"max_slices is {max_slices}; a waterfall needs at least 2")
+    source = blocks_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     lead, blocks = leading_part(source, SAMPLES_TO_CHOOSE_FROM)
     known = samples_known(source, lead, SAMPLES_TO_CHOOSE_FROM)
     plan = _plan(lead[0].sample_rate_hz, known, resolution_hz, window=window, overlap=overlap, detrend=detrend)

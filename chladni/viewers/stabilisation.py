@@ -3,7 +3,6 @@
 import numpy as np
 
 from chladni.signals.arrays import Real
-from chladni.signals.mode_set import ModeSet
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
 
 # Share of the poles' span that is left free on both sides, and the share of the whole below which it's zoomed.
@@ -12,9 +11,9 @@ ROOM, WORTH_ZOOMING = 0.1, 0.6
 STATUS_NAMES = ("new", "frequency stable", "and damping", "and vector")
 
 
-def frequency_range(modes: ModeSet, diagram: StabilisationDiagram) -> tuple[float, float]:
-    """Give the frequencies that are shown: those of the indicator, or the part of them that has poles."""
-    poles = np.concatenate([diagram.frequency_hz, modes.frequency_hz])
+def frequency_range(named_hz: Real, diagram: StabilisationDiagram) -> tuple[float, float]:
+    """Give the frequencies that are shown: those of the indicator, or the part of them that has poles or names."""
+    poles = np.concatenate([diagram.frequency_hz, named_hz])
     low, high = _ends(diagram.indicator_hz if diagram.indicator_hz.size > 1 else poles)
     if not poles.size:
         return low, high

@@ -3,7 +3,7 @@ import pytest
 
 import chladni
 from chladni.apps import analyse as analyse_module
-from chladni.apps import sources
+from chladni.io import source
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.time_series import TimeSeries
@@ -71,7 +71,7 @@ def test_only_the_channels_asked_for(tmp_path):
 
 
 def test_a_log_too_large_to_draw_is_drawn_in_part_and_said_so(tmp_path, monkeypatch):
-    monkeypatch.setattr(sources, "IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr(source, "IN_MEMORY_BYTES", 0)
     with chladni.open_log(write_arm(tmp_path)) as log:
         whole = chladni.analyse(log, channels=[TOOL])
         monkeypatch.setattr(analyse_module, "MOST_VALUES_DRAWN", 10_000)

@@ -60,22 +60,22 @@ def test_a_log_needs_no_argument_when_its_channels_tell_the_excitation(arm, trut
 
 def test_functions_give_what_their_log_gives(arm):
     # The lines that are asked for are the lines that modes are identified from.
-    response = frf(arm, reference=FORCE, resolution_hz=0.5)
+    response = frf(arm, references=FORCE, resolution_hz=0.5)
     np.testing.assert_allclose(
         identify_modes(response).frequency_hz,
-        identify_modes(arm, reference=FORCE, resolution_hz=0.5).frequency_hz,
+        identify_modes(arm, references=FORCE, resolution_hz=0.5).frequency_hz,
         rtol=1e-12,
     )
 
 
 def test_modes_are_given_finer_lines_than_a_spectrum_for_the_eye(arm):
-    modes = identify_modes(arm, reference=FORCE)
-    assert modes.provenance.segment_s > 1.9 * frf(arm, reference=FORCE).provenance.segment_s
+    modes = identify_modes(arm, references=FORCE)
+    assert modes.provenance.segment_s > 1.9 * frf(arm, references=FORCE).provenance.segment_s
 
 
 def test_a_series_gives_modes_from_functions_and_from_responses_alone(truth):
     series = series_of_arm()
-    assert_near_truth(identify_modes(series, reference=FORCE), truth)
+    assert_near_truth(identify_modes(series, references=FORCE), truth)
     # The arm is shaken by noise of one band, at one body: nearly what responses alone ask for.
     operational = identify_modes(series, operational=True, band_hz=FORCED_HZ)
     assert operational.references == ()
@@ -84,7 +84,7 @@ def test_a_series_gives_modes_from_functions_and_from_responses_alone(truth):
 
 
 def test_bands_are_fitted_one_by_one_and_joined(arm, truth):
-    modes = identify_modes(arm, reference=FORCE, band_hz=[(15, 57), (57, 130)])
+    modes = identify_modes(arm, references=FORCE, band_hz=[(15, 57), (57, 130)])
     assert modes.frequency_hz.size == 4
     # The border runs between two heavily damped modes: what crosses it is a residual only to first order.
     assert_near_truth(modes, truth, floor=0.01)
@@ -92,21 +92,21 @@ def test_bands_are_fitted_one_by_one_and_joined(arm, truth):
 
 @pytest.mark.slow
 def test_one_band_and_a_count_and_given_frequencies_limit_what_is_found(arm, truth):
-    within = identify_modes(arm, reference=FORCE, band_hz=(15, 57))
+    within = identify_modes(arm, references=FORCE, band_hz=(15, 57))
     assert within.frequency_hz.size == 2
-    assert identify_modes(arm, reference=FORCE, count=2).frequency_hz.size == 2
-    (near,) = identify_modes(arm, reference=FORCE, frequencies_hz=[48.2]).frequency_hz
+    assert identify_modes(arm, references=FORCE, count=2).frequency_hz.size == 2
+    (near,) = identify_modes(arm, references=FORCE, frequencies_hz=[48.2]).frequency_hz
     assert near == pytest.approx(truth.frequency_hz[1], rel=0.005)
 
 
 def test_named_responses_only(arm):
-    modes = identify_modes(arm, reference=FORCE, channels=[TOOL, WRIST])
+    modes = identify_modes(arm, references=FORCE, responses=[TOOL, WRIST])
     assert [channel.name for channel in modes.channels] == [TOOL, WRIST]
 
 
 @pytest.mark.parametrize("method", [CircleFit(), PolyReferenceLeastSquares(max_order=30)])
 def test_methods_for_functions(arm, truth, method):
-    modes = identify_modes(arm, reference=FORCE, method=method)
+    modes = identify_modes(arm, references=FORCE, method=method)
     assert modes.frequency_hz.size >= 3
     assert_near_truth(modes, truth, floor=0.005)
 
@@ -136,7 +136,7 @@ def test_cross_spectra_give_modes(truth):
 )
 def test_a_method_that_does_not_fit_the_source_is_refused(source, method, words):
     series = series_of_arm()
-    found = frf(series, reference=FORCE) if source == "response" else cross_spectra(series)
+    found = frf(series, references=FORCE) if source == "response" else cross_spectra(series)
     with pytest.raises(EstimateError, match=words):
         identify_modes(found, method=method)
 
@@ -149,7 +149,7 @@ def test_a_method_for_functions_does_not_work_on_responses_alone():
 @pytest.mark.parametrize("band", [(1, 2, 3), [[[1, 2]]], 5.0])
 def test_a_band_is_two_numbers(band):
     with pytest.raises(EstimateError, match="must be"):
-        identify_modes(series_of_arm(), reference=FORCE, band_hz=band)
+        identify_modes(series_of_arm(), references=FORCE, band_hz=band)
 
 
 def test_responses_alone_are_identified_in_one_band():
@@ -190,7 +190,7 @@ def test_a_motion_as_reference_holds_its_point_still(arm, truth):
     def warnings(modes):
         return [note for note in modes.provenance.notes if "held still there" in note]
 
-    (warning,) = warnings(identify_modes(arm, reference=TOOL, band_hz=FORCED_HZ))
+    (warning,) = warnings(identify_modes(arm, references=TOOL, band_hz=FORCED_HZ))
     assert TOOL in warning
     assert not warnings(identify_modes(arm))
 
@@ -207,6 +207,6 @@ def test_an_excitation_that_was_not_measured_does_not_hide_heavily_damped_modes(
     model = made.chain(damping=0.06)
     series = made.record(model, cycles=1500, rng=np.random.default_rng(1), noise=0.01, at=(0, 4))
     known = [channel.name for channel in series.channels if channel.name != made.FORCE.format(4)]
-    modes = identify_modes(series.select(known), reference=made.FORCE.format(0))
+    modes = identify_modes(series.select(known), references=made.FORCE.format(0))
     assert modes.frequency_hz.size >= 4
     assert_near_truth(modes, model)

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 import chladni
@@ -12,7 +13,7 @@ def test_items_are_gathered_side_by_side(tmp_path):
     with chladni.open_log(write_arm(tmp_path), setup=tmp_path / "setup.toml") as log:
         series = log.read([FORCE, TOOL])
         density, fall = chladni.psd(series), chladni.waterfall(series)
-        response = chladni.frf(series, reference=FORCE)
+        response = chladni.frf(series, references=FORCE)
         study = gather(series, density, fall, response)
         both = gather(log, Study(title="other", findings=("later",)))
     assert study.series == (series,)
@@ -39,9 +40,26 @@ def test_the_viewer_gets_the_study(monkeypatch):
     assert [study.title for study in shown] == ["a"]
 
 
+def test_every_value_has_a_page_in_a_file(tmp_path):
+    series = chladni.TimeSeries.from_arrays(np.random.default_rng(1).standard_normal((2, 4096)), sample_rate_hz=100.0)
+    response = chladni.frf(series, references="ch1")
+    modes = chladni.ModeSet.from_arrays([1.0, 2.0], [[1.0, 0.5, 0.2], [1.0, -0.5, 0.1]])
+    values = [
+        series, chladni.psd(series), chladni.cross_spectra(series), response, chladni.waterfall(series), modes,
+        chladni.coherence(series, references="ch1"), chladni.mac(modes),
+    ]  # fmt: skip
+    for value in values:
+        chladni.show(value, save=tmp_path / "one.rrd")
+        assert (tmp_path / "one.rrd").stat().st_size > 1000
+    assert [title for title, _ in gather(*values).pictures] == ["Coherence", "Modal assurance"]
+    with pytest.raises(SetupError, match="a float can't be shown"):
+        chladni.show(1.0, save=tmp_path / "two.rrd")
+    assert not (tmp_path / "two.rrd").exists()
+
+
 def test_transfer_functions_that_are_not_shown_are_told(tmp_path):
     with chladni.open_log(write_arm(tmp_path)) as log:
-        response = chladni.frf(log, reference=FORCE)
+        response = chladni.frf(log, references=FORCE)
     first = Study(title="first.mcap", response=response, findings=("sound",))
     alone, both = gather(first), gather(first, Study(title="second.mcap", response=response))
     assert alone.findings == ("sound",)
@@ -52,7 +70,7 @@ def test_transfer_functions_that_are_not_shown_are_told(tmp_path):
 @pytest.mark.parametrize("last", ["modes", "log"])
 def test_modes_are_checked_with_the_geometry_whichever_comes_first(tmp_path, last):
     with chladni.open_log(write_arm(tmp_path), setup=tmp_path / "setup.toml") as log:
-        modes = chladni.identify_modes(log, reference=FORCE)
+        modes = chladni.identify_modes(log, references=FORCE)
         study = gather(log, modes) if last == "modes" else gather(modes, log)
     assert study.modes is modes
     assert study.validation is not None
@@ -63,7 +81,7 @@ def test_modes_are_checked_with_the_geometry_whichever_comes_first(tmp_path, las
 
 def test_modes_that_are_not_shown_are_told(tmp_path):
     with chladni.open_log(write_arm(tmp_path)) as log:
-        modes = chladni.identify_modes(log, reference=FORCE)
+        modes = chladni.identify_modes(log, references=FORCE)
     first, second = (gather(Study(title=name), modes) for name in ("first.mcap", "second.mcap"))
     both = gather(first, second)
     assert both.modes is modes

@@ -3,8 +3,9 @@ import pytest
 from scipy import signal
 
 import chladni
-from chladni.apps import sources
+from chladni.apps.sources import Span, watched_grids
 from chladni.apps.spectra import Averaging, densities
+from chladni.io import source
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.testing import assert_close
@@ -21,8 +22,8 @@ def arm_log(tmp_path_factory):
 @pytest.fixture
 def large(monkeypatch):
     """Treat every log as one that doesn't fit in memory, in blocks of about a second."""
-    monkeypatch.setattr(sources, "IN_MEMORY_BYTES", 0)
-    monkeypatch.setattr(sources, "VALUES_IN_A_BLOCK", 1)
+    monkeypatch.setattr(source, "IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr(source, "VALUES_IN_A_BLOCK", 1)
 
 
 def noise(samples=20_000, channels=("a", "b"), rate_hz=500.0):
@@ -56,8 +57,8 @@ def test_a_large_log_is_averaged_block_by_block_to_the_same(arm_log, large):
     with chladni.open_log(arm_log) as log:
         in_memory = chladni.psd(log.read())
         assert_close(chladni.psd(log), in_memory, rtol=1e-12)
-        whole = chladni.frf(log.read(), reference=FORCE, resolution_hz=1.0)
-        assert_close(chladni.frf(log, reference=FORCE, resolution_hz=1.0), whole, rtol=1e-9)
+        whole = chladni.frf(log.read(), references=FORCE, resolution_hz=1.0)
+        assert_close(chladni.frf(log, references=FORCE, resolution_hz=1.0), whole, rtol=1e-9)
 
 
 def test_progress_rises_to_one(arm_log, large):
@@ -99,8 +100,8 @@ def test_a_log_in_which_nothing_moves_is_refused(tmp_path):
 def test_responses_default_to_what_moves_on_the_references_clock(tmp_path):
     with chladni.open_log(two_rates(tmp_path)) as log:
         with pytest.raises(EstimateError, match="response"):
-            chladni.frf(log, reference="/slow.accel.linear.x")
-        named = chladni.frf(log, reference="/slow.accel.linear.x", response="/fast.accel.linear.x")
+            chladni.frf(log, references="/slow.accel.linear.x")
+        named = chladni.frf(log, references="/slow.accel.linear.x", responses="/fast.accel.linear.x")
     assert named.frequency_hz[-1] == 50.0
     assert any("2 sampling grids joined: brought to 100 Hz by band-limited" in one for one in named.provenance.notes)
 
@@ -114,7 +115,7 @@ def driven(tmp_path_factory):
 
 def test_commands_are_held_between_their_messages(driven):
     with chladni.open_log(driven) as log:
-        found = chladni.frf(log, reference="/drive.data", response="/encoder.data", resolution_hz=0.5)
+        found = chladni.frf(log, references="/drive.data", responses="/encoder.data", resolution_hz=0.5)
     assert found.frequency_hz[-1] == 125.0
     low = (found.frequency_hz > 0.5) & (found.frequency_hz < 24.0)
     expected = GAIN * np.exp(-2j * np.pi * LATE_S * found.frequency_hz)
@@ -125,7 +126,7 @@ def test_commands_are_held_between_their_messages(driven):
 
 def test_the_way_of_joining_can_be_named(driven):
     with chladni.open_log(driven) as log:
-        smooth = chladni.frf(log, reference="/drive.data", response="/encoder.data", join="band-limited")
+        smooth = chladni.frf(log, references="/drive.data", responses="/encoder.data", join="band-limited")
         series = log.read(["/encoder.data", "/drive.data"], join="auto")
         with pytest.raises(LogError, match="different sampling grids"):
             log.read(["/encoder.data", "/drive.data"])
@@ -139,22 +140,22 @@ def test_the_way_of_joining_can_be_named(driven):
 
 def test_a_response_of_a_series_and_of_its_log_agree(arm_log):
     with chladni.open_log(arm_log) as log:
-        found = chladni.frf(log, reference=FORCE, response=[TOOL, WRIST], resolution_hz=1.0)
+        found = chladni.frf(log, references=FORCE, responses=[TOOL, WRIST], resolution_hz=1.0)
         series = log.read([FORCE, TOOL, WRIST])
-    assert_close(found, chladni.frf(series, reference=FORCE, resolution_hz=1.0), rtol=1e-12)
+    assert_close(found, chladni.frf(series, references=FORCE, resolution_hz=1.0), rtol=1e-12)
     assert found.values.shape[:2] == (2, 1)
 
 
 def test_a_reference_is_needed(arm_log):
     with chladni.open_log(arm_log) as log, pytest.raises(EstimateError, match="no reference is given"):
-        chladni.frf(log, reference=[])
+        chladni.frf(log, references=[])
 
 
 def test_a_hammer_is_recognised(shared_data):
     with chladni.open_log(shared_data / "hammer.mcap") as log:
-        found = chladni.frf(log, reference="/daq.hammer")
-        shorter = chladni.frf(log, reference="/daq.hammer", resolution_hz=2.0)
-        told = chladni.frf(log, reference="/daq.hammer", window="hann", resolution_hz=2.0)
+        found = chladni.frf(log, references="/daq.hammer")
+        shorter = chladni.frf(log, references="/daq.hammer", resolution_hz=2.0)
+        told = chladni.frf(log, references="/daq.hammer", window="hann", resolution_hz=2.0)
     assert (found.provenance.averaging, found.provenance.averages) == ("impact", 3)
     rejected = [note for note in found.provenance.notes if "rejected" in note]
     assert [note.split(" at ")[0] for note in rejected] == ["record 1", "record 3"]
@@ -167,7 +168,7 @@ def test_a_hammer_is_recognised(shared_data):
 )
 def test_the_aircrafts_torsion_by_default_settings(shared_data, level, frequency_hz, height):
     with chladni.open_log(shared_data / f"f16_level{level}.mcap") as log:
-        found = chladni.frf(log, reference="/shaker.wrench.force.z", response="/payload_rail.accel.linear.z")
+        found = chladni.frf(log, references="/shaker.wrench.force.z", responses="/payload_rail.accel.linear.z")
     peaks = chladni.find_response_peaks(found)
     torsion = max((peak for peak in peaks if 6.8 < peak.frequency_hz < 7.8), key=lambda peak: peak.height)
     assert torsion.frequency_hz == pytest.approx(frequency_hz, abs=0.02)
@@ -224,7 +225,7 @@ def test_a_tone_in_lines_that_are_not_judged_is_told_with_what_shows_it():
 def test_the_variance_of_a_large_log_is_watched_block_by_block(tmp_path, large):
     rows = {"stroke": 7 + np.sin(np.pi * np.arange(4600) / 200)}
     with log_of(tmp_path, rows) as log:
-        (grid,) = sources.watched_grids(log, None, sources.Span())
+        (grid,) = watched_grids(log, None, Span())
         assert len(list(grid)) > 1
         assert grid.variance("/stroke.accel.linear.x") == pytest.approx(rows["stroke"].var(), rel=1e-12)
         assert grid.variance("/none") == 0
@@ -260,7 +261,7 @@ def test_no_segment_between_gaps_says_which_resolution_would_do(tmp_path):
 def test_a_reference_that_never_changes_is_refused(tmp_path):
     rows = {"dead": np.zeros(4000), "a": np.random.default_rng(4).standard_normal(4000)}
     with log_of(tmp_path, rows) as log, pytest.raises(EstimateError, match=r"made\.mcap: /dead.*excites nothing"):
-        chladni.frf(log, reference="/dead.accel.linear.x")
+        chladni.frf(log, references="/dead.accel.linear.x")
 
 
 def test_values_too_large_to_square_are_an_error_that_names_their_channel(tmp_path):

@@ -292,7 +292,7 @@ def functions(tmp_path_factory: pytest.TempPathFactory) -> Path:
     import chladni
     from chladni.io.files.uff_modes import write_uff_modes
 
-    frf = chladni.frf(measured(), reference="force")
+    frf = chladni.frf(measured(), references="force")
     modes = chladni.identify_modes(frf, band_hz=(40, 80))
     path = tmp_path_factory.mktemp("functions") / "frf.uff"
     write_uff_modes(path, modes, geometry=chladni.load_setup(_setup(path.parent)).geometry, response=frf)

@@ -11,9 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from chladni.apps import sources
 from chladni.apps.sources import Span, watched_grids
-from chladni.io import log_reader
+from chladni.io import log_reader, source
 from chladni.io.clock.clock_count import SHORT
 from chladni.io.log import open_log
 from chladni.io.log_reader import MostlyEmptyError
@@ -133,7 +132,7 @@ def test_a_spectrum_of_what_is_too_empty_for_memory_goes_block_by_block(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(log_reader, "EMPTY_VALUES", FEW_VALUES)
-    monkeypatch.setattr(sources, "VALUES_IN_A_BLOCK", FEW_VALUES)
+    monkeypatch.setattr(source, "VALUES_IN_A_BLOCK", FEW_VALUES)
     path = tmp_path / "a.mcap"
     write_bursts(path, [(number * 20 * 10**9, 400) for number in range(8)], fields=10)
     with open_log(path) as log:

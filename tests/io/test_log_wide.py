@@ -162,13 +162,13 @@ def test_an_average_of_too_many_pairs_is_refused_before_any_sample_is_read(
 ) -> None:
     write_wide(tmp_path / "a.mcap", {"/a": 40})
     monkeypatch.setattr("chladni.spectral.products.MOST_RESULT_BYTES", 16 * 30**2 * 3)
-    monkeypatch.setattr("chladni.apps.sources.IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr("chladni.io.source.IN_MEMORY_BYTES", 0)
     with open_log(tmp_path / "a.mcap") as log:
         # Powers alone fit.
         assert chladni.psd(log).values.shape[0] == 40
         monkeypatch.setattr(type(log), "blocks", lambda *_, **__: iter([pytest.fail("read")] for _ in "1"))
         with pytest.raises(EstimateError, match=r"40 channels x 3 lines would take .* fewer channels"):
-            chladni.frf(log, reference="/a.f0")
+            chladni.frf(log, references="/a.f0")
 
 
 def test_many_streams_of_one_grid_are_one_series(tmp_path: Path) -> None:

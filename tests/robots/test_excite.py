@@ -87,7 +87,7 @@ def test_limits_hold_between_the_samples_of_every_grid(tmp_path: Path, effort: f
 
 
 def test_rows_are_the_series_and_end_where_they_start(tmp_path: Path) -> None:
-    made = chladni.excite(planar(tmp_path), length_s=8.0, rate_hz=100.0, base_frequency_hz=0.25)
+    made = chladni.excite(planar(tmp_path), duration_s=8.0, sample_rate_hz=100.0, base_frequency_hz=0.25)
     assert made.position.shape == (2, 801)
     expected = motion_of(made, np.arange(801) / 100.0)
     for rows, truth in zip((made.position, made.velocity, made.acceleration), expected, strict=True):
@@ -101,7 +101,7 @@ def test_the_torque_makes_mujoco_accelerate_as_planned(tmp_path: Path) -> None:
     import mujoco
 
     robot = load_robot(written(tmp_path, PLANAR.format(effort=60).replace('friction="0.3"', ""), "bare.urdf"))
-    made = chladni.excite(robot, rate_hz=20.0)
+    made = chladni.excite(robot, sample_rate_hz=20.0)
     data = mujoco.MjData(robot.model)
     for column in range(0, made.position.shape[1], 10):
         data.qpos[:], data.qvel[:] = made.position[:, column], made.velocity[:, column]
@@ -124,7 +124,7 @@ def test_two_links_in_a_plane_have_eleven_base_parameters_that_are_told_better(t
 
 def test_numbers_come_with_less_error_from_the_optimised_motion(tmp_path: Path) -> None:
     robot = planar(tmp_path)
-    made = chladni.excite(robot, rate_hz=20.0)
+    made = chladni.excite(robot, sample_rate_hz=20.0)
     rng, errors = np.random.default_rng(0), []
     for _ in range(9):
         other = replace_coefficients(made, rng)
@@ -199,10 +199,10 @@ def test_coupled_joints_rest_and_are_told(tmp_path: Path) -> None:
         ({"speed": 1.5}, "speed is 1.5"),
         ({"torque": float("nan")}, "torque is nan"),
         ({"harmonics": 1}, "two at least"),
-        ({"length_s": 25.0, "base_frequency_hz": 0.1}, "2.5 periods of 0.1 Hz.*give a length of 20 s"),
-        ({"length_s": float("inf")}, "length is inf"),
-        ({"rate_hz": 1.0}, "need a rate above 1 Hz"),
-        ({"length_s": 10_000.0}, "repeat a shorter one"),
+        ({"duration_s": 25.0, "base_frequency_hz": 0.1}, "2.5 periods of 0.1 Hz.*give a length of 20 s"),
+        ({"duration_s": float("inf")}, "length is inf"),
+        ({"sample_rate_hz": 1.0}, "need a rate above 1 Hz"),
+        ({"duration_s": 10_000.0}, "repeat a shorter one"),
     ],
 )
 def test_what_makes_no_sense_is_refused(tmp_path: Path, options: dict[str, object], message: str) -> None:

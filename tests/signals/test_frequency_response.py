@@ -13,7 +13,7 @@ def response():
     made = short_arm()
     rows = np.concatenate([one.values[:, :8192] for one in made.series])
     channels = tuple(one.channels[0] for one in made.series)
-    return frf(TimeSeries(values=rows, channels=channels, sample_rate_hz=1000.0), reference=FORCE)
+    return frf(TimeSeries(values=rows, channels=channels, sample_rate_hz=1000.0), references=FORCE)
 
 
 def test_responses_are_selected_in_the_order_asked_for(response):

@@ -11,7 +11,7 @@ from chladni.gap.records.log_use import LogUse
 from chladni.gap.records.robot import JointMotion, TorqueMap
 from chladni.robots.machine import Machine
 from chladni.signals.arrays import Real
-from chladni.signals.value import Value, require_shape
+from chladni.signals.value import Drawn, Value, require_shape
 
 Verdict = Literal["none", "parameters", "effect", "unknown"]
 
@@ -373,7 +373,7 @@ class AnyLaw:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Diagnosis:
+class Diagnosis(Drawn):
     """Result of `chladni.diagnose_gap`.
 
     Attributes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chladni.modal.operational.response_shapes import ResponseShape, largest_one
 from chladni.modal.operational.setup_shapes import joined, measured_shape
-from chladni.modal.shapes.mac import SharedChannel, mac, shared_channels
+from chladni.modal.shapes.mac import SharedChannel, shape_mac, shared_channels
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel, find_channel
 from chladni.signals.errors import EstimateError
@@ -217,7 +217,7 @@ def _mac_or_zero(mine: NDArray[np.complexfloating], theirs: NDArray[np.complexfl
     moving, moving_too = np.any(mine != 0, axis=1), np.any(theirs != 0, axis=1)
     # MAC refuses shapes of zeros, which a sensor in a node gives.
     if np.any(moving) and np.any(moving_too):
-        agreement[np.ix_(moving, moving_too)] = mac(mine[moving], theirs[moving_too])
+        agreement[np.ix_(moving, moving_too)] = shape_mac(mine[moving], theirs[moving_too])
     return agreement
 
 

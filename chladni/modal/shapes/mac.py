@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import Channel, Vector
 from chladni.signals.errors import EstimateError
-from chladni.signals.mode_set import ModeSet
+from chladni.signals.modal_assurance import ModalAssurance
+from chladni.signals.mode_set import ModeSet, Rows
 
 # Cosine of a few hundredths of a degree: setup files hold directions with three or four digits.
 _PARALLEL = 1e-6
@@ -34,36 +35,53 @@ class SharedChannel:
     sign: float
 
 
-def mac(a: ArrayLike, b: ArrayLike) -> Real:
+def mac(a: ModeSet | ArrayLike, b: ModeSet | ArrayLike | None = None, *, rows: Rows | None = None) -> ModalAssurance:
     """Compare each shape of `a` with each of `b`: abs(a^H b)^2/((a^H a)(b^H b)).
 
     Allemang (2003), "The modal assurance criterion: twenty years of use and abuse", Sound and Vibration 37(8), for
-    complex shapes.
+    complex shapes. Two sets of modes are compared over the channels that they share, see `shared_channels`; over a
+    single channel all shapes are alike and the result is 1.
 
     Parameters
     ----------
     a, b
-        ``[mode, channel]`` real or complex, over the same channels; a single shape ``[channel]`` counts as one mode.
+        Modes, or shapes ``[mode, channel]`` or ``[channel, mode]``, real or complex, over the same channels; a single
+        shape ``[channel]`` is one mode. Without `b` the modes of `a` are compared with each other: large values off
+        the diagonal say that these sensors can't tell two modes apart, or that one mode was found twice.
+    rows
+        What each row of an array belongs to; needed where the arrays fit either way.
 
     Returns
     -------
-    ``[mode of a, mode of b]`` always a matrix, 0 (orthogonal) to 1 (the same up to a complex factor).
+    ModalAssurance
+        ``[mode of a, mode of b]``; ``.plot()`` draws it.
 
     Raises
     ------
     EstimateError
-        When the shapes differ in length, have no channel, are all zero, or hold NaN or infinity.
+        When the shapes don't fit together, or fit both as rows and as columns and `rows` isn't given; when a shape is
+        zero, or holds NaN or infinity; when sets share no channel.
 
     Examples
     --------
-    >>> mac([1.0, 2.0], [[2j, 4j], [2.0, -1.0]])
-    array([[1., 0.]])
+    >>> mac([1.0, 2.0], [[2j, 4j], [2.0, -1.0], [0.0, 0.1]]).values.round(3)
+    array([[1. , 0. , 0.8]])
     """
+    if b is None:
+        b = a
+    if isinstance(a, ModeSet) and isinstance(b, ModeSet):
+        return ModalAssurance(values=cross_mac(a, b), a_hz=a.frequency_hz, b_hz=b.frequency_hz)
+    one, other = _by_mode(a, b, rows)
+    return ModalAssurance(values=shape_mac(one, other), a_hz=_known_hz(a, one), b_hz=_known_hz(b, other))
+
+
+def shape_mac(a: ArrayLike, b: ArrayLike) -> Real:
+    """Compare shapes ``[mode, channel]``, or one ``[channel]``; see `mac`, whose matrix this gives."""
     unit_a, unit_b = _unit_length(a, "a"), _unit_length(b, "b")
     if unit_a.shape[1] != unit_b.shape[1]:
         raise EstimateError(
             f"shapes of {unit_a.shape[1]} and {unit_b.shape[1]} channels can't be compared; give both over the same "
-            "channels, or use cross_mac, which finds those that two sets share"
+            "channels, or give two mode sets, whose shared channels are found"
         )
     product: Real = np.abs(unit_a.conj() @ unit_b.T) ** 2
     # Rounding of the two lengths may exceed 1 by an epsilon, which 1 - MAC must not show as negative.
@@ -76,7 +94,7 @@ def auto_mac(modes: ModeSet) -> Real:
     Large values off the diagonal say that these sensors can't tell the two modes apart, or that one mode was found
     twice.
     """
-    return mac(modes.shapes, modes.shapes)
+    return shape_mac(modes.shapes, modes.shapes)
 
 
 def cross_mac(a: ModeSet, b: ModeSet) -> Real:
@@ -91,7 +109,8 @@ def cross_mac(a: ModeSet, b: ModeSet) -> Real:
     """
     shared = shared_channels(a.channels, b.channels)
     sign = np.array([pair.sign for pair in shared])
-    return mac(a.shapes[:, [pair.row_a for pair in shared]], sign * b.shapes[:, [pair.row_b for pair in shared]])
+    rows_a, rows_b = ([pair.row_a for pair in shared], [pair.row_b for pair in shared])
+    return shape_mac(a.shapes[:, rows_a], sign * b.shapes[:, rows_b])
 
 
 def shared_channels(a: Sequence[Channel], b: Sequence[Channel]) -> tuple[SharedChannel, ...]:
@@ -150,6 +169,34 @@ def _neighbour(channel: Channel, others: Sequence[Channel], taken: set[int]) -> 
         if row not in taken and other.point == channel.point and sign is not None:
             return row, sign
     return None
+
+
+def _by_mode(a: ModeSet | ArrayLike, b: ModeSet | ArrayLike, rows: Rows | None) -> tuple[Complex, Complex]:
+    """Give the shapes of both as ``[mode, channel]``, where only one way of reading the arrays fits."""
+    ways: tuple[Rows, ...] = ("modes", "channels") if rows is None else (rows,)
+    read = [(_read(a, way), _read(b, way)) for way in ways]
+    fitting = [(one, other) for one, other in read if one.shape[-1:] == other.shape[-1:]]
+    shapes = " and ".join(str(_read(one, "modes").shape) for one in (a, b))
+    if not fitting:
+        raise EstimateError(f"shapes {shapes} have no channels in common; give both over the same channels")
+    # Two single shapes have nothing to turn.
+    if len(fitting) > 1 and any(one.ndim > 1 for one in (*fitting[0], *fitting[1])):
+        raise EstimateError(
+            f"shapes {shapes} fit as [mode, channel] and as [channel, mode]; say rows='modes' or rows='channels'"
+        )
+    return fitting[0]
+
+
+def _read(one: ModeSet | ArrayLike, rows: Rows) -> Complex:
+    """Give shapes with their channels along the last axis, where the rows of an array are `rows`."""
+    if isinstance(one, ModeSet):
+        return np.asarray(one.shapes, dtype=np.complex128)
+    array = np.asarray(one, dtype=np.complex128)
+    return array.T if rows == "channels" and array.ndim == 2 else array
+
+
+def _known_hz(one: ModeSet | ArrayLike, shapes: Complex) -> Real:
+    return one.frequency_hz if isinstance(one, ModeSet) else np.full(np.atleast_2d(shapes).shape[0], np.nan)
 
 
 def _unit_length(shapes: ArrayLike, name: str) -> Complex:

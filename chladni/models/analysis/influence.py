@@ -18,6 +18,7 @@ from chladni.models.core.reading import InfluenceTable
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 from chladni.signals.linear_algebra import in_one_thread
+from chladni.signals.renamed import renamed
 
 #: The four of the paper's table 1.
 PAPER_BEHAVIOUR = ("answer_time", "peak_acceleration", "resonance_frequency", "critical_frequency")
@@ -51,6 +52,7 @@ class Strongest:
     of_columns: tuple[int | None, ...]
 
 
+@renamed(band="settling_band")
 @in_one_thread()
 def influence(
     system: Model | Instrument,
@@ -62,7 +64,7 @@ def influence(
     changes: float | Mapping[str, float] = CHANGE,
     from_input: str = "",
     to_output: str = "",
-    band: float = SETTLING_BAND,
+    settling_band: float = SETTLING_BAND,
 ) -> InfluenceTable:
     """Compute influence coefficients as the paper defines them (equation 3), and as logarithmic derivatives.
 
@@ -90,7 +92,7 @@ def influence(
         coefficient.
     from_input, to_output
         Whose behaviour; the instrument's own, or the first of each when empty.
-    band
+    settling_band
         Of settling.
 
     Returns
@@ -104,11 +106,11 @@ def influence(
         For an unknown name, a change to nothing or to minus something, and a dead time inside a loop.
     """
     model, source, output, size = _resolved(system, values, options, from_input, to_output)
-    nominal = behaviour(model, from_input=source, to_output=output, size=size, band=band)
+    nominal = behaviour(model, from_input=source, to_output=output, size=size, band=settling_band)
     # Operating conditions (pressure, flow) are varied only when asked for: the table is about what is built.
     rows = [model.parameters.require(name) for name in parameters] or _construction(model)
     kept = _known(nominal, behaviour_names or _existing(nominal))
-    study = _Study(model=model, nominal=nominal, names=kept, size=size, band=band)
+    study = _Study(model=model, nominal=nominal, names=kept, size=size, band=settling_band)
     applied = [_applied(row, changes) for row in rows]
     initial = study.values(nominal)
     relative = np.array([study.relative_change(row, one) for row, one in zip(rows, applied, strict=True)]) + 0.0

@@ -13,6 +13,7 @@ from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import ModelError
 from chladni.signals.linear_algebra import in_one_thread
+from chladni.signals.renamed import renamed
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.visible import place_of
 
@@ -30,13 +31,14 @@ class Samples(Protocol):
 Excitation = TimeSeries | Mapping[str, Samples] | Samples
 
 
+@renamed(rate_hz="sample_rate_hz", seconds="duration_s")
 @in_one_thread()
 def simulate(
     model: Model,
     excitation: Excitation,
     *,
-    seconds: float | None = None,
-    rate_hz: float | None = None,
+    duration_s: float | None = None,
+    sample_rate_hz: float | None = None,
     initial: Mapping[str, float] | Real | None = None,
     seed: int = 0,
     tolerance: float = 1e-7,
@@ -53,9 +55,9 @@ def simulate(
     excitation
         A series, whose channels are matched to inputs by the input's channel or name; or a mapping from names of
         inputs to excitations; or one excitation, for the first input. Inputs without any are zero, which is flagged.
-    seconds
+    duration_s
         How long; by default the whole series.
-    rate_hz
+    sample_rate_hz
         Samples a second; of a series its own.
     initial
         States at the start: values by name, or ``[state]``; at rest by default.
@@ -78,10 +80,10 @@ def simulate(
 
     compiled = model.compile()
     if isinstance(excitation, TimeSeries):
-        signals, driven = _from_series(compiled, excitation, seconds, rate_hz)
+        signals, driven = _from_series(compiled, excitation, duration_s, sample_rate_hz)
         rate, start_ns = excitation.sample_rate_hz, excitation.start_time_ns
     else:
-        count, rate, start_ns = *_grid(seconds, rate_hz), 0
+        count, rate, start_ns = *_grid(duration_s, sample_rate_hz), 0
         signals, driven = _from_excitations(compiled, excitation, count, rate, seed)
     integration = Integrator(compiled, rate, tolerance=tolerance).run(signals, initial=initial)
     simulation = Simulation(
@@ -103,30 +105,30 @@ def _with_flags(simulation: Simulation, flags: tuple[str, ...]) -> Simulation:
     return replace(simulation, flags=simulation.flags + tuple(flags)) if flags else simulation
 
 
-def _grid(seconds: float | None, rate_hz: float | None) -> tuple[int, float]:
-    if seconds is None or rate_hz is None:
-        raise ModelError("an excitation has no length of its own; give seconds and rate_hz")
-    for name, value in (("seconds", seconds), ("rate_hz", rate_hz)):
+def _grid(duration_s: float | None, sample_rate_hz: float | None) -> tuple[int, float]:
+    if duration_s is None or sample_rate_hz is None:
+        raise ModelError("an excitation has no length of its own; give duration_s and sample_rate_hz")
+    for name, value in (("duration_s", duration_s), ("sample_rate_hz", sample_rate_hz)):
         if not (np.isfinite(value) and value > 0):
             raise ModelError(f"{name} = {value} must be finite and positive")
-    count = round(seconds * rate_hz)
+    count = round(duration_s * sample_rate_hz)
     if count < 1:
-        raise ModelError(f"{seconds:g} s at {rate_hz:g} Hz hold no sample; simulate longer or faster")
-    return count, float(rate_hz)
+        raise ModelError(f"{duration_s:g} s at {sample_rate_hz:g} Hz hold no sample; simulate longer or faster")
+    return count, float(sample_rate_hz)
 
 
 def _from_series(
-    compiled: CompiledModel, series: TimeSeries, seconds: float | None, rate_hz: float | None
+    compiled: CompiledModel, series: TimeSeries, duration_s: float | None, sample_rate_hz: float | None
 ) -> tuple[Real, set[str]]:
-    if rate_hz is not None and abs(rate_hz - series.sample_rate_hz) > 1e-9 * series.sample_rate_hz:
+    if sample_rate_hz is not None and abs(sample_rate_hz - series.sample_rate_hz) > 1e-9 * series.sample_rate_hz:
         raise ModelError(
-            f"rate_hz = {rate_hz:g}, but the series has {series.sample_rate_hz:g} Hz; resample it first, or leave "
-            "rate_hz out"
+            f"sample_rate_hz = {sample_rate_hz:g}, but the series has {series.sample_rate_hz:g} Hz; resample it "
+            "first, or leave sample_rate_hz out"
         )
-    if seconds is not None:
-        if not 0 < seconds <= series.duration_s * (1 + 1e-9):
-            raise ModelError(f"seconds = {seconds:g}, but the series is {series.duration_s:g} s long")
-        series = series.window(end_s=seconds)
+    if duration_s is not None:
+        if not 0 < duration_s <= series.duration_s * (1 + 1e-9):
+            raise ModelError(f"duration_s = {duration_s:g}, but the series is {series.duration_s:g} s long")
+        series = series.window(end_s=duration_s)
     names = [channel.name for channel in series.channels]
     signals = np.zeros((len(compiled.inputs), series.samples))
     driven = set()
@@ -159,7 +161,7 @@ def _sound(series: TimeSeries, row: int, terminal: Terminal) -> Real:
 
 
 def _from_excitations(
-    compiled: CompiledModel, excitation: Mapping[str, Samples] | Samples, count: int, rate_hz: float, seed: int
+    compiled: CompiledModel, excitation: Mapping[str, Samples] | Samples, count: int, sample_rate_hz: float, seed: int
 ) -> tuple[Real, set[str]]:
     from chladni.models.integrator.integrator import require_memory
 
@@ -171,13 +173,13 @@ def _from_excitations(
     for name in excitation:
         if name not in names:
             raise ModelError(f"no input {name!r}; inputs: {', '.join(names) or 'none'}")
-    require_memory(compiled, count, rate_hz)
+    require_memory(compiled, count, sample_rate_hz)
     signals = np.zeros((len(names), count))
     # One generator for each input: what drives one doesn't depend on whether another is driven.
     for place, name in enumerate(names):
         if name in excitation:
             rng = np.random.default_rng([seed, place])
-            found = np.asarray(excitation[name].samples(count, rate_hz, rng), dtype=np.float64)
+            found = np.asarray(excitation[name].samples(count, sample_rate_hz, rng), dtype=np.float64)
             if found.shape != (count,):
                 raise ModelError(f"excitation of {name!r} gave shape {found.shape}, {(count,)} was expected")
             signals[place] = found

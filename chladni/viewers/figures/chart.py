@@ -30,10 +30,15 @@ def chart_figure(chart: Chart) -> Figure:
 def charts_figure(charts: Sequence[Chart]) -> Figure:
     """Draw several charts on one sheet, one under another."""
     with look():
-        figure, stack = sheet([SQUARE_IN if chart.equal or _is_map(chart) else HEIGHT_IN for chart in charts])
+        figure, stack = sheet([chart_height_in(chart) for chart in charts])
         for axes, chart in zip(stack, charts, strict=True):
-            _draw(axes, chart)
+            draw_chart(axes, chart)
     return figure
+
+
+def chart_height_in(chart: Chart) -> float:
+    """Inches that a chart is high."""
+    return SQUARE_IN if chart.equal or _is_map(chart) else HEIGHT_IN
 
 
 def chart_figures(charts: Sequence[Chart], *, name: str) -> Iterator[tuple[str, Figure]]:
@@ -49,7 +54,8 @@ def chart_figures(charts: Sequence[Chart], *, name: str) -> Iterator[tuple[str, 
             yield f"{name} {kind}{label}", charts_figure([group[row] for row in rows])
 
 
-def _draw(axes: Axes, chart: Chart) -> None:
+def draw_chart(axes: Axes, chart: Chart) -> None:
+    """Draw the curves of a chart."""
     colours: dict[str, int] = {}
     for curve in chart.curves:
         # The points of a setting have the colour of its lines.

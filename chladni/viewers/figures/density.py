@@ -1,11 +1,13 @@
 """Power spectral densities with their one-sigma bands and named peaks."""
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.study import Study
 from chladni.viewers.drawing import decibels_of_power, level_limits
@@ -45,6 +47,21 @@ def _figure(
     names = {density.channels[row].name for row in group.rows}
     peaks = [peak for peak in study.peaks if peak.unit == unit and set(peak.channels[:1]) <= names]
     figure, (axes,) = sheet([HEIGHT_IN], above_points=STRIP_POINTS if peaks else 0.0)
+    draw_densities(axes, density, group, style, peaks=peaks, frequency_scale=frequency_scale)
+    axes.set_xlabel("Frequency [Hz]")
+    return figure
+
+
+def draw_densities(
+    axes: Axes,
+    density: PowerSpectralDensity,
+    group: Group,
+    style: Style,
+    *,
+    peaks: Sequence[Peak] = (),
+    frequency_scale: Literal["linear", "log"] = "linear",
+) -> None:
+    """Draw the densities of a group with their error bands, and the names of `peaks`."""
     axes.set_xscale(frequency_scale)
     # A logarithmic axis has no place for zero frequency.
     shown = density.frequency_hz > (0.0 if frequency_scale == "log" else -1.0)
@@ -54,10 +71,8 @@ def _figure(
         _draw(axes, density, row, shown, style, banded=len(group.rows) <= BANDS_OF)
     axes.set_xlim(density.frequency_hz[shown][0], density.frequency_hz[-1])
     named = label_peaks(axes, peaks)
-    axes.set_xlabel("Frequency [Hz]")
-    axes.set_ylabel(f"Power spectral density [{printed_unit(unit)}]")
+    axes.set_ylabel(f"Power spectral density [{printed_unit(density.units[group.rows[0]])}]")
     legend(axes, above_points=named)
-    return figure
 
 
 def _draw(

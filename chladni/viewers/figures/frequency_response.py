@@ -1,5 +1,7 @@
 """Frequency responses: magnitude, phase and coherence above one another."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -34,33 +36,48 @@ def response_figures(study: Study) -> dict[str, Figure]:
         }
 
 
+def is_coherent(panel: Panel) -> bool:
+    """Whether there is a coherence to draw: a file and an array needn't hold one."""
+    return any(np.isfinite(panel.coherence(row)).any() for row in panel.group.rows)
+
+
 def _figure(study: Study, panel: Panel, style: Style) -> Figure:
     peaks = _peaks(study, panel)
-    # A file needn't hold a coherence.
-    coherent = any(np.isfinite(panel.coherence(row)).any() for row in panel.group.rows)
     figure, (magnitude, phase, *below) = sheet(
-        HEIGHTS_IN if coherent else HEIGHTS_IN[:2], above_points=STRIP_POINTS if peaks else 0.0, sharex=True
+        HEIGHTS_IN if is_coherent(panel) else HEIGHTS_IN[:2], above_points=STRIP_POINTS if peaks else 0.0, sharex=True
     )
-    _draw_magnitude(magnitude, peaks, panel, style)
-    for row in panel.group.rows:
-        colour = paint(style.on_light(panel.response.responses[row]))
-        angle = np.angle(panel.function(row), deg=True)
-        breaks = np.union1d(line_breaks(panel.frequency_hz()), phase_wraps(angle))
-        phase.plot(*with_breaks(panel.frequency_hz(), angle, breaks), color=colour)
-        breaks = line_breaks(panel.frequency_hz())
-        for axes in below:
-            axes.plot(*with_breaks(panel.frequency_hz(), panel.coherence(row), breaks), color=colour)
-    phase.set_ylabel(f"Phase [deg]\n{CONVENTION}")
-    phase.set_ylim(-190, 190)
-    phase.set_yticks([-180, -90, 0, 90, 180])
+    draw_magnitude(magnitude, panel, style, peaks)
+    draw_phase(phase, panel, style)
     for axes in below:
-        axes.set_ylabel(("Coherence" if len(panel.response.references) == 1 else "Multiple\ncoherence") + " [1]")
-        axes.set_ylim(0, 1.04)
+        draw_coherence(axes, panel, style)
     figure.axes[-1].set_xlabel("Frequency [Hz]")
     return figure
 
 
-def _draw_magnitude(axes: Axes, peaks: list[Peak], panel: Panel, style: Style) -> None:
+def draw_phase(axes: Axes, panel: Panel, style: Style) -> None:
+    """Draw the phase, broken where it wraps."""
+    for row in panel.group.rows:
+        angle = np.angle(panel.function(row), deg=True)
+        breaks = np.union1d(line_breaks(panel.frequency_hz()), phase_wraps(angle))
+        colour = paint(style.on_light(panel.response.responses[row]))
+        axes.plot(*with_breaks(panel.frequency_hz(), angle, breaks), color=colour)
+    axes.set_ylabel(f"Phase [deg]\n{CONVENTION}")
+    axes.set_ylim(-190, 190)
+    axes.set_yticks([-180, -90, 0, 90, 180])
+
+
+def draw_coherence(axes: Axes, panel: Panel, style: Style) -> None:
+    """Draw the coherence."""
+    breaks = line_breaks(panel.frequency_hz())
+    for row in panel.group.rows:
+        colour = paint(style.on_light(panel.response.responses[row]))
+        axes.plot(*with_breaks(panel.frequency_hz(), panel.coherence(row), breaks), color=colour)
+    axes.set_ylabel(("Coherence" if len(panel.response.references) == 1 else "Multiple\ncoherence") + " [1]")
+    axes.set_ylim(0, 1.04)
+
+
+def draw_magnitude(axes: Axes, panel: Panel, style: Style, peaks: Sequence[Peak] = ()) -> None:
+    """Draw the magnitude with its error bands, and the names of `peaks`."""
     magnitudes = np.array([np.abs(panel.function(row)) for row in panel.group.rows])
     low, high = level_limits(decibels_of_amplitude(magnitudes))
     # A resonance narrower than a line rises above every line.

@@ -30,7 +30,7 @@ LIMIT_LETTERS, LIMIT_LINE_IN, LIMIT_SIZE = 110, 0.13, 7.0
 Part = tuple[float, Callable[[Figure, SubplotSpec], None]]
 
 
-def gap_sheet(evidence: GapEvidence) -> Figure:
+def gap_sheet(evidence: GapEvidence, make: Callable[..., Figure] = Figure) -> Figure:
     """Draw the answer as a title over the output that errs most, in time and frequency, the force and the sites."""
     with look():
         parts = _parts(evidence)
@@ -38,7 +38,7 @@ def gap_sheet(evidence: GapEvidence) -> Figure:
         limits = [line for one in _limits(evidence.found) for line in _wrapped(one, LIMIT_LETTERS)]
         heights = [height for height, _ in parts]
         texts = 0.2 + LINE_IN * len(lines) + LIMIT_LINE_IN * len(limits)
-        figure = Figure(figsize=(WIDTH_IN * 1.25, sum(heights) + texts), layout="constrained")
+        figure = make(figsize=(WIDTH_IN * 1.25, sum(heights) + texts), layout="constrained")
         figure.suptitle("\n".join(map(plain, lines)), fontsize=SIZE, x=0.02, ha="left")
         if limits:
             figure.supxlabel("\n".join(map(plain, limits)), fontsize=LIMIT_SIZE, x=0.02, ha="left")

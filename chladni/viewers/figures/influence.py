@@ -28,21 +28,25 @@ def influence_figure(table: InfluenceTable, *, of: Literal["log_derivative", "fi
     of
         ``log_derivative``: d ln(behaviour)/d ln(construction); ``finite``: the paper's R_PCD/R_PCF.
     """
-    coefficients = table.log_derivative if of == "log_derivative" else table.finite
-    rows, columns = coefficients.shape
+    rows, columns = table.log_derivative.shape
     with look():
         size = (MARGIN_IN + COLUMN_IN * columns, 1.3 + ROW_IN * rows)
         figure = Figure(figsize=size, layout="constrained")
-        axes = figure.subplots()
-        axes.imshow(
-            np.ma.masked_invalid(coefficients), cmap=_COLOURS, vmin=-FULL_COLOUR, vmax=FULL_COLOUR, aspect="auto"
-        )
-        _write(axes, coefficients)
-        _mark(axes, coefficients)
-        _name(axes, table)
-        what = "d ln(behaviour)/d ln(construction)" if of == "log_derivative" else "R_PCD/R_PCF for a finite change"
-        axes.set_title(f"Influence, {what}\nframe: strongest of its row, dot: strongest of its column", loc="left")
+        draw_influence(figure.subplots(), table, of=of)
     return figure
+
+
+def draw_influence(
+    axes: Axes, table: InfluenceTable, *, of: Literal["log_derivative", "finite"] = "log_derivative"
+) -> None:
+    """Draw the cells of a table."""
+    coefficients = table.log_derivative if of == "log_derivative" else table.finite
+    axes.imshow(np.ma.masked_invalid(coefficients), cmap=_COLOURS, vmin=-FULL_COLOUR, vmax=FULL_COLOUR, aspect="auto")
+    _write(axes, coefficients)
+    _mark(axes, coefficients)
+    _name(axes, table)
+    what = "d ln(behaviour)/d ln(construction)" if of == "log_derivative" else "R_PCD/R_PCF for a finite change"
+    axes.set_title(f"Influence, {what}\nframe: strongest of its row, dot: strongest of its column", loc="left")
 
 
 def _write(axes: Axes, coefficients: Real) -> None:

@@ -62,16 +62,21 @@ def cross_mac_figure(
         cell = (width - 1.4) / max(len(columns), 1)
         figure = Figure(figsize=(width, min(cell * len(rows) + 0.9, 2 * WIDTH_IN)), layout="constrained")
         axes = figure.subplots()
-        axes.grid(visible=False)
-        image = axes.imshow(mac, vmin=0, vmax=1, cmap=mpl.colormaps["viridis"], interpolation="nearest")
-        _draw_numbers(axes, mac)
-        _name(axes, rows, columns)
+        draw_mac(axes, mac, rows=rows, columns=columns)
         axes.set_xlabel(plain(column_name))
         axes.set_ylabel(plain(row_name))
-        bar = figure.colorbar(image, ax=axes, aspect=25, pad=0.02)
-        bar.set_label("MAC [1]")
-        bar.outline.set_linewidth(0.0)
     return figure
+
+
+def draw_mac(axes: Axes, mac: Real, *, rows: Sequence[str], columns: Sequence[str]) -> None:
+    """Draw a matrix ``[row, column]`` with its numbers, the names of its modes, and a colour scale."""
+    axes.grid(visible=False)
+    image = axes.imshow(mac, vmin=0, vmax=1, cmap=mpl.colormaps["viridis"], interpolation="nearest")
+    _draw_numbers(axes, mac)
+    name_cells(axes, rows, columns)
+    bar = axes.figure.colorbar(image, ax=axes, aspect=25, pad=0.02)
+    bar.set_label("MAC [1]")
+    bar.outline.set_linewidth(0.0)
 
 
 def _draw_numbers(axes: Axes, mac: Real) -> None:
@@ -91,7 +96,8 @@ def _draw_numbers(axes: Axes, mac: Real) -> None:
         )
 
 
-def _name(axes: Axes, rows: Sequence[str], columns: Sequence[str]) -> None:
+def name_cells(axes: Axes, rows: Sequence[str], columns: Sequence[str]) -> None:
+    """Write the names of rows and columns beside a matrix, every so many where there are many."""
     for axis, names, turned in ((axes.xaxis, columns, 90), (axes.yaxis, rows, 0)):
         every = -(-len(names) // TICKS)
         axis.set_ticks(

@@ -19,12 +19,12 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 }
 
 
-def rendered(figure: Figure, kind: str) -> bytes:
+def rendered(figure: Figure, kind: str, *, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
     """Give a figure as ``png``, ``svg`` or ``pdf``; without dates and random names, so that files can be compared."""
     content = io.BytesIO()
     with look():
         mpl.rcParams["svg.hashsalt"] = "chladni"
-        figure.dpi = DOTS_PER_INCH
+        figure.dpi = dots_per_inch
         _arrange(figure)
         # Not savefig: it draws a figure that has a layout engine twice, the first time to arrange it.
         canvas: Any = get_registered_canvas_class(kind)(figure)

@@ -1,9 +1,12 @@
 """The stabilisation diagram over its indicator."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.signals.study import Study
@@ -32,20 +35,27 @@ def stabilisation_figures(study: Study) -> dict[str, Figure]:
 def _figure(modes: ModeSet, diagram: StabilisationDiagram) -> Figure:
     named = modes.frequency_hz.size + len(modes.harmonics) > 0
     figure, (poles,) = sheet([HEIGHT_IN], above_points=STRIP_POINTS if named else 0.0)
-    _draw_indicator(poles, modes, diagram)
-    poles.set_xlim(*frequency_range(modes, diagram))
+    draw_stabilisation(poles, diagram, modes.frequency_hz, [line.frequency_hz for line in modes.harmonics])
+    poles.set_xlabel("Frequency [Hz]")
+    return figure
+
+
+def draw_stabilisation(
+    poles: Axes, diagram: StabilisationDiagram, modes_hz: Real, machines_hz: Sequence[float] = ()
+) -> None:
+    """Draw poles over the indicator, and the frequencies of modes and of machines."""
+    shown_hz = frequency_range(modes_hz, diagram)
+    _draw_indicator(poles, shown_hz, diagram)
+    poles.set_xlim(*shown_hz)
     poles.set_ylim(*order_range(diagram))
     _draw_poles(poles, diagram)
-    poles.set_xlabel("Frequency [Hz]")
     poles.set_ylabel("Model order")
-    names = [(float(hz), "black") for hz in modes.frequency_hz]
-    names += [(line.frequency_hz, MACHINE) for line in modes.harmonics]
-    low_hz, high_hz = poles.get_xlim()
+    names = [(float(hz), "black") for hz in modes_hz] + [(hz, MACHINE) for hz in machines_hz]
+    low_hz, high_hz = shown_hz
     names = [(hertz, colour) for hertz, colour in names if low_hz <= hertz <= high_hz]
     for hertz, colour in names:
         poles.axvline(hertz, color=colour, linewidth=0.4, alpha=0.5, zorder=2)
     legend(poles, above_points=name_above(poles, names))
-    return figure
 
 
 def _draw_poles(poles: Axes, diagram: StabilisationDiagram) -> None:
@@ -78,12 +88,12 @@ def _draw_poles(poles: Axes, diagram: StabilisationDiagram) -> None:
     )
 
 
-def _draw_indicator(poles: Axes, modes: ModeSet, diagram: StabilisationDiagram) -> None:
+def _draw_indicator(poles: Axes, shown_hz: tuple[float, float], diagram: StabilisationDiagram) -> None:
     """Curves on a logarithmic axis of their own on the right, behind the poles."""
     behind = poles.twinx()
     poles.set_zorder(behind.get_zorder() + 1)
     poles.patch.set_visible(False)
-    low_hz, high_hz = frequency_range(modes, diagram)
+    low_hz, high_hz = shown_hz
     inside = (diagram.indicator_hz >= low_hz) & (diagram.indicator_hz <= high_hz)
     low, high = level_limits(decibels_of_amplitude(diagram.indicator[:, inside]))
     logarithmic(behind, 10 ** (low / 20), 10 ** (high / 20))

@@ -39,36 +39,46 @@ def waterfall_figures(study: Study) -> dict[str, Figure]:
 
 def _figure(waterfall: Waterfall, group: Group, style: Style) -> Figure:
     figure, stack = sheet([1.5] * len(group.rows), sharex=True, sharey=True)
-    levels = [_level(waterfall, row) for row in group.rows]
+    levels = [level_of(waterfall, row) for row in group.rows]
     # One scale for the figure, so that colours of different channels can be compared.
-    limits = _colour_limits(levels)
+    limits = colour_limits(levels)
     image = None
     for axes, row, level in zip(stack, group.rows, levels, strict=True):
-        image = _draw(axes, waterfall, level, limits, style)
+        image = draw_waterfall(axes, waterfall, level, limits, style)
         axes.set_title(plain(style.labels[waterfall.channels[row].name]), loc="left", pad=2)
         axes.set_ylabel("Frequency [Hz]")
     stack[-1].set_xlabel("Time [s]")
     if image is not None:
-        bar = figure.colorbar(image, ax=stack, aspect=18 * len(stack), pad=0.02)
-        bar.set_label(f"PSD [{decibel_unit(power_density_unit(group.unit))}]")
-        bar.outline.set_linewidth(0.0)
+        add_scale(image, stack, group)
     return figure
 
 
-def _level(waterfall: Waterfall, row: int) -> Real:
+def add_scale(image: AxesImage, stack: list[Axes], group: Group) -> None:
+    """Put the colour scale beside the axes that share it."""
+    bar = stack[0].figure.colorbar(image, ax=stack, aspect=18 * len(stack), pad=0.02)
+    bar.set_label(f"PSD [{decibel_unit(power_density_unit(group.unit))}]")
+    bar.outline.set_linewidth(0.0)
+
+
+def level_of(waterfall: Waterfall, row: int) -> Real:
+    """``[slice, line]`` in dB, shortened to what can be seen."""
     shortened, _ = block_maximum(waterfall.values[row], axis=0, limit=PIXELS)
     shortened, _ = block_maximum(shortened, axis=1, limit=PIXELS)
     return decibels_of_power(shortened)
 
 
-def _colour_limits(levels: list[Real]) -> tuple[float, float]:
+def colour_limits(levels: list[Real]) -> tuple[float, float]:
+    """Give the ends of the colour scale that all of these levels share."""
     known = np.concatenate([level[np.isfinite(level)] for level in levels])
     if known.size == 0:
         return -DYNAMIC_RANGE_DB, 0.0
     return max(float(known.min()), float(known.max()) - DYNAMIC_RANGE_DB), float(known.max())
 
 
-def _draw(axes: Axes, waterfall: Waterfall, level: Real, limits: tuple[float, float], style: Style) -> AxesImage:
+def draw_waterfall(
+    axes: Axes, waterfall: Waterfall, level: Real, limits: tuple[float, float], style: Style
+) -> AxesImage:
+    """Draw the levels of one channel, what is missing in grey."""
     # Grey is in no part of the scale: what is missing can't be taken for a low level.
     colours = mpl.colormaps["viridis"].with_extremes(bad=MISSING)
     start_s = (waterfall.start_time_ns - style.origin_ns) / NS_PER_S

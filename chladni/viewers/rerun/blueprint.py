@@ -77,6 +77,7 @@ class Views:
     channels: Sequence[ChannelViews] = ()
     responses: Sequence[ResponseViews] = ()
     modes: ModesViews | None = None
+    pictures: Sequence[rrb.View] = ()
 
 
 def arrange(views: Views) -> rrb.Blueprint:
@@ -88,6 +89,8 @@ def arrange(views: Views) -> rrb.Blueprint:
         pages.append(_responses(views))
     if views.modes is not None:
         pages.append(_modes(views.modes))
+    if views.pictures:
+        pages.append(rrb.Tabs(*views.pictures, name="Pictures"))
     # Nothing is left to heuristics: they would add a view for every entity.
     return rrb.Blueprint(
         rrb.Tabs(*pages, active_tab=_first_page(views, len(pages))),
@@ -137,8 +140,9 @@ def _response(response: ResponseViews, name: str) -> rrb.Container:
 
 
 def _first_page(views: Views, count: int) -> int:
-    """The overview, unless it has words alone and there are modes to look at, which come last."""
-    return count - 1 if views.modes is not None and not (views.waveforms or views.densities) else 0
+    """The overview, unless it has words alone and there are modes or pictures to look at, which come last."""
+    last = views.modes is not None or bool(views.pictures)
+    return count - 1 if last and not (views.waveforms or views.densities) else 0
 
 
 def _first_timeline(views: Views) -> str:

@@ -1,6 +1,7 @@
 """A study drawn into a recording."""
 
 import rerun as rr
+import rerun.blueprint as rrb
 
 from chladni.signals.study import Study
 from chladni.signals.visible import visible
@@ -55,11 +56,21 @@ def draw(recording: rr.RecordingStream, study: Study) -> None:
         channels=_draw_over_time(recording, study, style),
         responses=_draw_responses(recording, study, style),
         modes=_draw_modes(recording, study, style),
+        pictures=_draw_pictures(recording, study),
     )
     # The blueprint goes last: rerun 0.41 has lost rows that followed one in a file (rerun issue 12769).
     recording.flush()
     recording.send_blueprint(arrange(views), make_active=True, make_default=True)
     recording.flush()
+
+
+def _draw_pictures(recording: rr.RecordingStream, study: Study) -> list[rrb.View]:
+    views: list[rrb.View] = []
+    for place, (title, png) in enumerate(study.pictures):
+        path = f"/pictures/{place}"
+        recording.log(path, rr.EncodedImage(contents=png, media_type="image/png"), static=True)
+        views.append(rrb.Spatial2DView(origin=path, name=visible(title)))
+    return views
 
 
 def _draw_over_time(recording: rr.RecordingStream, study: Study, style: Style) -> list[ChannelViews]:

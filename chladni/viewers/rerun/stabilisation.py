@@ -37,7 +37,9 @@ def draw_stabilisation(recording: rr.RecordingStream, modes: ModeSet) -> rrb.Vie
     if diagram is None:
         return None
     height = ALONE if modes.fit is None else HEIGHT
-    canvas = Canvas(width=WIDTH, height=height, x_range=frequency_range(modes, diagram), y_range=order_range(diagram))
+    canvas = Canvas(
+        width=WIDTH, height=height, x_range=frequency_range(modes.frequency_hz, diagram), y_range=order_range(diagram)
+    )
     canvas.draw_axes(recording, f"{PATH}/axes", x_name="Frequency [Hz]", y_name="Model order")
     _draw_indicator(recording, canvas, diagram)
     _draw_modes(recording, canvas, modes)

@@ -160,7 +160,7 @@ def test_functions_that_a_file_holds_are_the_transfer_functions(tmp_path: Path) 
     with chladni.open(write_functions(tmp_path / "a.uff")) as log:
         found = chladni.frf(log)
         assert_close(found, log.functions, rtol=0)
-        assert_close(chladni.frf(log, reference=HAMMER.name, response=TIP.name), log.functions, rtol=0)
+        assert_close(chladni.frf(log, references=HAMMER.name, responses=TIP.name), log.functions, rtol=0)
         modes = chladni.identify_modes(log, band_hz=(20, 80))
         study = chladni.analyse(log)
     assert modes.frequency_hz == pytest.approx([40.0], rel=1e-6)

@@ -98,7 +98,7 @@ def test_a_record_shows_modes_that_are_half_a_line_wide():
     # 0.2 % at 1 Hz in 800 s: lines of 0.01 Hz, on which the first mode is 0.4 lines wide.
     structure = truth.chain(damping=0.002)
     series = truth.record(structure, cycles=800, rng=np.random.default_rng(1), noise=0.01)
-    modes = chladni.identify_modes(series, reference=truth.FORCE.format(0))
+    modes = chladni.identify_modes(series, references=truth.FORCE.format(0))
     assert modes.frequency_hz.size == 5
     assert np.all(np.abs(modes.frequency_hz - structure.frequency_hz) < 5 * modes.frequency_std_hz)
     assert np.all(np.abs(modes.damping_ratio - 0.002) < 5 * modes.damping_std)
@@ -107,12 +107,12 @@ def test_a_record_shows_modes_that_are_half_a_line_wide():
 def test_a_resolution_that_hides_all_modes_is_told_with_the_one_that_shows_them():
     structure = truth.chain(damping=0.002)
     series = truth.record(structure, cycles=800, rng=np.random.default_rng(0), noise=0.01)
-    blurred = chladni.identify_modes(series, reference=truth.FORCE.format(0), resolution_hz=0.1)
+    blurred = chladni.identify_modes(series, references=truth.FORCE.format(0), resolution_hz=0.1)
     assert blurred.frequency_hz.size == 0
     (note,) = [note for note in blurred.provenance.notes if note.startswith("no mode is taken near")]
     asked_hz = float(note.split("ask for a resolution of ")[1].split(" Hz")[0])
     assert asked_hz < 0.1
-    followed = chladni.identify_modes(series, reference=truth.FORCE.format(0), resolution_hz=asked_hz)
+    followed = chladni.identify_modes(series, references=truth.FORCE.format(0), resolution_hz=asked_hz)
     assert followed.frequency_hz.size == 5
 
 

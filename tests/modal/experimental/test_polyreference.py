@@ -17,7 +17,7 @@ IDENTIFY = PolyReferenceLeastSquares().identify
 
 def chain_response(seed, *, cycles=800, noise=0.01, resolution_hz=0.02, **options):
     series = truth.record(CHAIN, cycles=cycles, rng=np.random.default_rng(seed), noise=noise, **options)
-    return chladni.frf(series, reference=FORCE, resolution_hz=resolution_hz)
+    return chladni.frf(series, references=FORCE, resolution_hz=resolution_hz)
 
 
 def line_response(seed, *, at=(0,), noise=0.03, lines_hz=None, model=CHAIN):
@@ -126,7 +126,7 @@ def test_noise_has_no_modes(samples, references, responses, resolution_hz):
         rng = np.random.default_rng(seed)
         series = truth.noise_record(samples, rng=rng, references=references, responses=responses)
         names = [truth.FORCE.format(number) for number in range(references)]
-        modes = IDENTIFY(chladni.frf(series, reference=names, resolution_hz=resolution_hz))
+        modes = IDENTIFY(chladni.frf(series, references=names, resolution_hz=resolution_hz))
         assert modes.frequency_hz.size == 0
         assert any(note.startswith("no mode:") for note in modes.provenance.notes)
         assert modes.shapes.shape == (0, responses)
@@ -285,7 +285,7 @@ def test_mixed_motions_are_refused():
 )
 def test_aircraft(shared_data, level, expected):
     with chladni.open_log(shared_data / f"f16_level{level}.mcap") as log:
-        modes = IDENTIFY(chladni.frf(log, reference="/shaker.wrench.force.z"))
+        modes = IDENTIFY(chladni.frf(log, references="/shaker.wrench.force.z"))
     assert np.all((modes.frequency_hz > 2.002) & (modes.frequency_hz < 14.99))
     # The mode near 12.4 Hz is weak and may be missing.
     kept = modes.frequency_hz[np.abs(modes.frequency_hz - 12.4) > 0.2]
@@ -295,7 +295,7 @@ def test_aircraft(shared_data, level, expected):
 
 def test_hammer(shared_data):
     with chladni.open_log(shared_data / "hammer.mcap") as log:
-        modes = IDENTIFY(chladni.frf(log, reference="/daq.hammer"), band_hz=(200.0, 3500.0))
+        modes = IDENTIFY(chladni.frf(log, references="/daq.hammer"), band_hz=(200.0, 3500.0))
     for expected in (447, 558, 731, 872, 1362, 1407, 2085, 2249, 2607, 3295):
         assert np.min(np.abs(modes.frequency_hz / expected - 1)) < 0.005
     assert np.all(np.isfinite(modes.frequency_std_hz) & (modes.frequency_std_hz > 0))

@@ -11,7 +11,7 @@ from tests.modal import truth
 
 def test_where_leakage_is_too_much_to_follow_error_bars_are_simpler_and_it_is_said(monkeypatch):
     series = truth.record(truth.chain(), cycles=1000, rng=np.random.default_rng(3), noise=0.01)
-    response = frf(series, reference=truth.FORCE.format(0), resolution_hz=0.008)
+    response = frf(series, references=truth.FORCE.format(0), resolution_hz=0.008)
     followed = PolyReferenceLeastSquares().identify(response)
     monkeypatch.setattr(chladni.modal.fit.scatter_estimate, "MOST_PRODUCTS", 1000)
     simple = PolyReferenceLeastSquares().identify(response)

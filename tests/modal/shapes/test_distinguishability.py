@@ -80,7 +80,7 @@ def test_when_no_two_modes_are_told_apart_they_arent_listed() -> None:
 
 def test_three_accelerometers_on_an_aircraft(shared_data: Path) -> None:
     with open_log(shared_data / "f16_level1.mcap") as log:
-        modes = identify_modes(log, reference="/shaker.wrench.force.z")
+        modes = identify_modes(log, references="/shaker.wrench.force.z")
     checks = validate(modes)
     count = modes.frequency_hz.size
     off_diagonal = checks.auto_mac[np.triu_indices(count, k=1)]

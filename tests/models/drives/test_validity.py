@@ -145,7 +145,7 @@ def test_units_of_limits_are_known():
 
 
 def step(model, name, size, seconds=0.1, rate_hz=5e3):
-    return simulate(model, {name: Step(size=size)}, seconds=seconds, rate_hz=rate_hz)
+    return simulate(model, {name: Step(size=size)}, duration_s=seconds, sample_rate_hz=rate_hz)
 
 
 @pytest.mark.parametrize("shown", [(), (ChosenSignal(signal="displacement"),)], ids=["all", "without the flow"])

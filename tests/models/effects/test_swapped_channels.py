@@ -40,7 +40,7 @@ def test_a_simulation_shows_it() -> None:
     plain = replace(tree(), controllers=())
     first, second = (one.name for one in plain.outputs[:2])
     real = plain.with_effects((attached("swapped_channels", f"{first}~{second}", {}),))
-    runs = [simulate(model, RandomNoise(rms=10.0), seconds=0.5, rate_hz=1000.0) for model in (plain, real)]
+    runs = [simulate(model, RandomNoise(rms=10.0), duration_s=0.5, sample_rate_hz=1000.0) for model in (plain, real)]
     np.testing.assert_allclose(runs[1].outputs.values[[1, 0]], runs[0].outputs.values[:2])
 
 

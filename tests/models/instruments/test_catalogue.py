@@ -92,7 +92,10 @@ def test_the_load_of_a_drive_is_one_that_it_is_built_for(
     compiled = instrument.model().compile()
     # Small enough, too, that no flag goes up.
     flags = simulate(
-        instrument.model(), {instrument.load_input: Step(size=instrument.load_size)}, seconds=0.1, rate_hz=1e4
+        instrument.model(),
+        {instrument.load_input: Step(size=instrument.load_size)},
+        duration_s=0.1,
+        sample_rate_hz=1e4,
     ).flags
     idle = ", ".join(one.name for one in compiled.inputs if one.name != instrument.load_input)
     assert flags == (f"not driven, taken as zero: {idle}",)

@@ -73,24 +73,24 @@ def test_a_log_drives_the_input_by_channel_or_by_name(name):
 
 
 def test_part_of_a_log_is_simulated():
-    found = simulate(one_body(), series(np.ones(100)), seconds=0.25)
+    found = simulate(one_body(), series(np.ones(100)), duration_s=0.25)
     assert found.outputs.samples == 50
 
 
 def test_excitations_are_sampled_by_name_and_seed():
     model = Given(plain_model([[0.0]], [[1.0, 2.0]], [[1.0]], [[0.0, 0.0]]), word=("far out",))
-    found = simulate(model, {"u1": Ramp()}, seconds=0.1, rate_hz=100.0)
+    found = simulate(model, {"u1": Ramp()}, duration_s=0.1, sample_rate_hz=100.0)
     times = np.arange(10) / 100
     np.testing.assert_allclose(found.states[0], times**2, atol=1e-15)
     assert found.flags == ("not driven, taken as zero: u0", "far out")
-    both = simulate(model, {"u0": Noise(), "u1": Noise()}, seconds=0.1, rate_hz=100.0, seed=4)
-    one = simulate(model, {"u1": Noise()}, seconds=0.1, rate_hz=100.0, seed=4)
+    both = simulate(model, {"u0": Noise(), "u1": Noise()}, duration_s=0.1, sample_rate_hz=100.0, seed=4)
+    one = simulate(model, {"u1": Noise()}, duration_s=0.1, sample_rate_hz=100.0, seed=4)
     np.testing.assert_array_equal(both.inputs.values[1], one.inputs.values[1])
     assert not np.array_equal(both.inputs.values[0], both.inputs.values[1])
 
 
 def test_one_excitation_drives_the_first_input():
-    found = simulate(one_body(), Ramp(), seconds=0.1, rate_hz=100.0)
+    found = simulate(one_body(), Ramp(), duration_s=0.1, sample_rate_hz=100.0)
     np.testing.assert_array_equal(found.inputs.values[0], np.arange(10) / 100)
     assert found.refined_steps >= 0
 
@@ -102,13 +102,13 @@ def test_one_excitation_drives_the_first_input():
         (series(np.ones(10), unit="V"), {}, "is in V, input 'force' takes N"),
         (series([1.0, np.nan, 1.0]), {}, "1 of 3 samples are missing, the first at 0.005 s"),
         (series(np.ones(3), valid=np.array([[True, True, False]])), {}, "the first at 0.01 s"),
-        (series(np.ones(10)), {"rate_hz": 100.0}, "the series has 200 Hz; resample it first"),
-        (series(np.ones(10)), {"seconds": 1.0}, "the series is 0.05 s long"),
-        (Ramp(), {}, "give seconds and rate_hz"),
-        (Ramp(), {"seconds": 0.001, "rate_hz": 10.0}, "hold no sample"),
-        (Ramp(), {"seconds": -1.0, "rate_hz": 10.0}, "seconds = -1.0 must be finite and positive"),
-        ({"nowhere": Ramp()}, {"seconds": 1.0, "rate_hz": 10.0}, "no input 'nowhere'; inputs: force"),
-        (Ramp(), {"seconds": 1e9, "rate_hz": 1e4}, "simulate less time or a lower rate"),
+        (series(np.ones(10)), {"sample_rate_hz": 100.0}, "the series has 200 Hz; resample it first"),
+        (series(np.ones(10)), {"duration_s": 1.0}, "the series is 0.05 s long"),
+        (Ramp(), {}, "give duration_s and sample_rate_hz"),
+        (Ramp(), {"duration_s": 0.001, "sample_rate_hz": 10.0}, "hold no sample"),
+        (Ramp(), {"duration_s": -1.0, "sample_rate_hz": 10.0}, "duration_s = -1.0 must be finite and positive"),
+        ({"nowhere": Ramp()}, {"duration_s": 1.0, "sample_rate_hz": 10.0}, "no input 'nowhere'; inputs: force"),
+        (Ramp(), {"duration_s": 1e9, "sample_rate_hz": 1e4}, "simulate less time or a lower rate"),
     ],
 )
 def test_what_does_not_fit_is_told(excitation, options, words):
@@ -122,10 +122,10 @@ def test_an_excitation_must_give_as_many_samples_as_asked():
             return np.zeros(count - 1)
 
     with pytest.raises(ModelError, match=r"gave shape \(9,\), \(10,\) was expected"):
-        simulate(one_body(), Short(), seconds=0.1, rate_hz=100.0)
+        simulate(one_body(), Short(), duration_s=0.1, sample_rate_hz=100.0)
 
 
 def test_a_model_without_inputs_can_not_be_excited():
     model = Given(plain_model([[0.0]], np.zeros((1, 0)), [[1.0]], np.zeros((1, 0))))
     with pytest.raises(ModelError, match="no input to excite"):
-        simulate(model, Ramp(), seconds=0.1, rate_hz=100.0)
+        simulate(model, Ramp(), duration_s=0.1, sample_rate_hz=100.0)

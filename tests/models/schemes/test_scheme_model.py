@@ -249,7 +249,7 @@ def test_dead_time_in_a_loop_follows_the_method_of_steps() -> None:
         element_block("plant", "i", "+r", "-late", gain=gain),
         element_block("late", "dead-time", "plant", delay=delay_s),
     )
-    found = simulate(model, Step(), seconds=3.0, rate_hz=100.0)
+    found = simulate(model, Step(), duration_s=3.0, sample_rate_hz=100.0)
     time_s = np.arange(found.outputs.values.shape[1]) / 100.0
     expected = np.zeros_like(time_s)
     for power in range(1, 12):
@@ -263,7 +263,7 @@ def test_dead_time_in_a_loop_without_lag_makes_a_staircase() -> None:
     model = scheme(
         element_block("gain", "p", "+r", "-late", gain=0.5), element_block("late", "dead-time", "gain", delay=0.25)
     )
-    found = simulate(model, Step(), seconds=2.0, rate_hz=100.0).outputs.values[0]
+    found = simulate(model, Step(), duration_s=2.0, sample_rate_hz=100.0).outputs.values[0]
     steps = np.cumsum(0.5 * (-0.5) ** np.arange(8))
     for number, level in enumerate(steps):
         np.testing.assert_allclose(found[25 * number + 1 : 25 * number + 24], level, rtol=1e-9)
@@ -374,14 +374,14 @@ def test_declared_outputs_come_first_under_their_own_names() -> None:
 
 def test_an_effect_at_a_block_acts_on_what_enters_it_inside_the_loop() -> None:
     limited = loop().with_effects([attached("saturation", "plant", {"limit": 0.5})])
-    found = simulate(limited, {"r": Step(size=4.0)}, seconds=8.0, rate_hz=200.0)
+    found = simulate(limited, {"r": Step(size=4.0)}, duration_s=8.0, sample_rate_hz=200.0)
     names = [channel.name for channel in found.outputs.channels]
     # What enters the plant is limited to 0.5, so the plant can't come above 3 times that.
     plant, regulator = (found.outputs.values[names.index(name)] for name in ("plant", "regulator"))
     assert regulator.max() > 5.0
     assert plant.max() <= 1.5 + 1e-6
     np.testing.assert_allclose(plant[-1], 1.5, rtol=1e-3)
-    free = simulate(loop(), {"r": Step(size=4.0)}, seconds=8.0, rate_hz=200.0)
+    free = simulate(loop(), {"r": Step(size=4.0)}, duration_s=8.0, sample_rate_hz=200.0)
     np.testing.assert_allclose(free.outputs.values[names.index("plant")][-1], 4.0, rtol=1e-3)
 
 
@@ -396,7 +396,7 @@ def test_an_effect_at_what_leaves_a_block_goes_round_the_loop() -> None:
 def test_an_effect_behind_the_last_block_touches_nothing_else() -> None:
     model = scheme(element_block("plant", "pt1", "r", time_constant=0.2), element_block("sensor", "p", "plant"))
     clipped = model.with_effects([attached("clipping", "sensor", {"limit": 0.5})])
-    found = simulate(clipped, Step(), seconds=2.0, rate_hz=100.0).outputs.values
+    found = simulate(clipped, Step(), duration_s=2.0, sample_rate_hz=100.0).outputs.values
     assert found[1].max() == 0.5
     assert found[0].max() > 0.99
 
@@ -430,7 +430,7 @@ def test_what_is_unconnected_is_told() -> None:
         "block loose feeds nothing",
         "input load feeds nothing",
     )
-    assert model.flags(simulate(model, Step(), seconds=0.1, rate_hz=10.0)) == model.remarks()
+    assert model.flags(simulate(model, Step(), duration_s=0.1, sample_rate_hz=10.0)) == model.remarks()
 
 
 @pytest.mark.parametrize(
@@ -475,7 +475,7 @@ def test_a_loop_that_grows_is_told_with_its_dead_time() -> None:
             element_block("plant", "i", "+r", "-late", gain=gain),
             element_block("late", "dead-time", "plant", delay=0.1),
         )
-        flags = simulate(model, Step(), seconds=0.5, rate_hz=100.0).flags
+        flags = simulate(model, Step(), duration_s=0.5, sample_rate_hz=100.0).flags
         assert any(flag.startswith("unstable: poles at ") for flag in flags) == told
 
 
@@ -485,4 +485,6 @@ def test_what_effects_say_is_said() -> None:
 
     own = replace(CATALOGUE["gain_error"], name="own", flags=far)
     model = loop().with_effects([attached(own, "plant", {"gain": 2.0}), attached("delay", "r", {"delay": 0.1})])
-    assert simulate(model, {"r": Step(), "load": Step()}, seconds=0.1, rate_hz=10.0).flags == ("far at plant with 2",)
+    assert simulate(model, {"r": Step(), "load": Step()}, duration_s=0.1, sample_rate_hz=10.0).flags == (
+        "far at plant with 2",
+    )

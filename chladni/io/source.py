@@ -1,0 +1,199 @@
+"""What verbs take: a log, a path, a series, or an array with its sample rate."""
+
+import os
+from collections.abc import Iterable, Mapping
+from typing import Protocol, TypeGuard, cast, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chladni.io.log import Log
+from chladni.io.log import open as open_log
+from chladni.signals.channel import Names, as_names
+from chladni.signals.errors import SetupError
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.time_series import Arrays, TimeSeries
+from chladni.signals.value import Value
+
+#: What every verb on samples over time takes.
+SeriesLike = Log | TimeSeries | os.PathLike[str] | Arrays
+#: Consecutive parts of one series.
+Blocks = Iterable[TimeSeries]
+
+# A compressed log of this size holds at most some tens of millions of samples.
+IN_MEMORY_BYTES = 48 << 20
+VALUES_IN_A_BLOCK = 1 << 21
+
+
+@runtime_checkable
+class _ArrayLike(Protocol):
+    def __array__(self) -> object: ...
+
+
+def is_small(log: Log) -> bool:
+    """Whether all samples of a log may be held in memory at once, once more where they are in memory already."""
+    return log.size_bytes <= IN_MEMORY_BYTES
+
+
+def log_or_series(source: SeriesLike, *, sample_rate_hz: float | None = None) -> Log | TimeSeries:
+    """Open a path and make a series of an array; a log stays one, and nothing of it is read.
+
+    Parameters
+    ----------
+    source
+        A log, a path to one, a series, an array ``[channel, sample]`` or ``[sample]``, or arrays by their channel's
+        name.
+    sample_rate_hz
+        Samples a second of an array, or of a file that doesn't say it.
+
+    Raises
+    ------
+    SetupError
+        When an array comes without its rate, or a log or a series with another one.
+    EstimateError
+        When the array is no series, see `TimeSeries.from_arrays`.
+    LogError
+        When the file can't be read.
+
+    Examples
+    --------
+    >>> log_or_series([0.0, 1.0, 0.0, -1.0], sample_rate_hz=8.0).duration_s
+    0.5
+    """
+    if isinstance(source, str | os.PathLike):
+        return open_log(os.fspath(source), sample_rate_hz=sample_rate_hz)
+    if isinstance(source, Log | TimeSeries):
+        if sample_rate_hz is not None:
+            raise SetupError("sample_rate_hz is for arrays; a log and a series know their own, so leave it out")
+        return source
+    if isinstance(source, Value):
+        raise SetupError(
+            f"a {type(source).__name__} holds no samples over time; give a log, a path, a series, or an array"
+        )
+    if sample_rate_hz is None:
+        raise SetupError("an array doesn't tell its sample rate; give sample_rate_hz=")
+    return TimeSeries.from_arrays(source, sample_rate_hz=sample_rate_hz)
+
+
+def series_of(
+    source: SeriesLike,
+    *,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> TimeSeries:
+    """Give what a caller has as one series in memory: the first line of a verb that works on samples.
+
+    Parameters
+    ----------
+    source, sample_rate_hz
+        See `log_or_series`.
+    channels
+        Message paths or names; None for all, which must share a sampling grid.
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
+
+    Raises
+    ------
+    LogError
+        When the file can't be read, there is no such channel, or channels don't share a grid.
+    SetupError, EstimateError
+        See `log_or_series`.
+
+    Examples
+    --------
+    >>> series_of({"f": np.ones(8), "a": np.zeros(8)}, sample_rate_hz=4.0, channels="a", start_s=1.0).values.shape
+    (1, 4)
+    """
+    found = log_or_series(source, sample_rate_hz=sample_rate_hz)
+    if isinstance(found, Log):
+        return found.read(None if channels is None else as_names(channels), start_s=start_s, end_s=end_s)
+    chosen = found if channels is None else found.select(channels)
+    return chosen if start_s is None and end_s is None else chosen.window(start_s=start_s, end_s=end_s)
+
+
+def blocks_of(
+    source: SeriesLike | Blocks,
+    *,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> TimeSeries | Blocks:
+    """Give what a caller has as a series where it fits in memory, else as its blocks, read one at a time.
+
+    Consecutive blocks stay what they are. Arguments and errors are as for `series_of`.
+    """
+    if _is_blocks(source):
+        if not all(option is None for option in (channels, sample_rate_hz, start_s, end_s)):
+            raise SetupError("blocks are averaged as they come; choose channels and times where they are made")
+        return source
+    found = log_or_series(cast("SeriesLike", source), sample_rate_hz=sample_rate_hz)
+    if isinstance(found, TimeSeries) or is_small(found):
+        return series_of(found, channels=channels, start_s=start_s, end_s=end_s)
+    names = None if channels is None else as_names(channels)
+    grid = found.grids(names, start_s=start_s, end_s=end_s)[0]
+    seconds = block_seconds(len(grid.names), grid.sample_rate_hz)
+    return found.blocks(names, seconds=seconds, start_s=start_s, end_s=end_s)
+
+
+def block_seconds(channels: int, sample_rate_hz: float) -> float:
+    """How long a block is that memory holds easily, in seconds."""
+    return max(1.0, VALUES_IN_A_BLOCK / (channels * sample_rate_hz))
+
+
+def response_of(
+    source: FrequencyResponse | SeriesLike, *, frequency_hz: ArrayLike | None = None
+) -> FrequencyResponse:
+    """Give frequency responses, those of an array ``[response, reference, frequency]`` with its frequencies.
+
+    Raises
+    ------
+    SetupError
+        When an array comes without frequencies, responses with others, or it's neither.
+    EstimateError
+        When shapes don't fit, see `FrequencyResponse.from_arrays`.
+    """
+    if isinstance(source, FrequencyResponse):
+        _require_none(frequency_hz)
+        return source
+    return FrequencyResponse.from_arrays(*_over_frequency(source, frequency_hz))
+
+
+def density_of(
+    source: PowerSpectralDensity | SeriesLike,
+    *,
+    frequency_hz: ArrayLike | None = None,
+    averages: float | None = None,
+) -> PowerSpectralDensity:
+    """Give power spectral densities, those of an array ``[channel, frequency]``; errors are as for `response_of`."""
+    if isinstance(source, PowerSpectralDensity):
+        _require_none(frequency_hz)
+        _require_none(averages)
+        return source
+    return PowerSpectralDensity.from_arrays(*_over_frequency(source, frequency_hz), averages=averages)
+
+
+def _require_none(of_an_array: ArrayLike | None) -> None:
+    if of_an_array is not None:
+        raise SetupError("frequency_hz and averages are for arrays; spectra know their own, so leave them out")
+
+
+def _over_frequency(source: object, frequency_hz: ArrayLike | None) -> tuple[ArrayLike, ArrayLike]:
+    if isinstance(source, Value | Log | str | os.PathLike | Mapping):
+        raise SetupError(
+            f"a {type(source).__name__} is no spectrum; give the estimate, or an array with frequency_hz="
+        )
+    if frequency_hz is None:
+        raise SetupError("an array doesn't tell its frequencies; give frequency_hz=")
+    return frequency_hz, np.asarray(source)
+
+
+def _is_blocks(source: object) -> TypeGuard[Blocks]:
+    """Whether something is blocks of a series, and no array."""
+    if isinstance(source, list | tuple):
+        return all(isinstance(one, TimeSeries) for one in source)
+    known = (str, os.PathLike, Log, Value, Mapping, _ArrayLike)
+    return isinstance(source, Iterable) and not isinstance(source, known)

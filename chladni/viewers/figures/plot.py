@@ -1,0 +1,287 @@
+"""One picture of one value, whatever it is: what ``value.plot()`` draws."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial, singledispatch
+from itertools import pairwise
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chladni.models.core.reading import Chart, InfluenceTable, InstrumentReading
+from chladni.models.core.simulation import Simulation
+from chladni.signals.coherence import Coherence
+from chladni.signals.errors import SetupError
+from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.modal_assurance import ModalAssurance
+from chladni.signals.mode_set import ModeSet
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.stabilisation_diagram import StabilisationDiagram
+from chladni.signals.study import Study
+from chladni.signals.time_series import TimeSeries
+from chladni.signals.value import Value
+from chladni.signals.waterfall import Waterfall
+from chladni.viewers.drawing import thin
+from chladni.viewers.figures import density, frequency_response, influence, waterfall
+from chladni.viewers.figures.chart import chart_height_in, draw_chart
+from chladni.viewers.figures.mac import draw_mac, name_cells
+from chladni.viewers.figures.sheet import WIDTH_IN, legend, look, paint, plain
+from chladni.viewers.figures.stabilisation import HEIGHT_IN as STABILISATION_IN
+from chladni.viewers.figures.stabilisation import draw_stabilisation
+from chladni.viewers.figures.waveforms import POINTS
+from chladni.viewers.groups import Group, groups
+from chladni.viewers.labels import printed_unit
+from chladni.viewers.mode_tables import hertz, mode_ticks
+from chladni.viewers.panels import panels
+from chladni.viewers.style import ON_LIGHT, Style
+
+# More than these in one figure are too many to look at: the value should be selected from.
+MOST_PICTURES = 6
+LEGEND_IN, LINES_IN = 0.25, 1.9
+CELL_IN = 0.22
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Axes of a picture: their height, and what draws into them."""
+
+    height_in: float
+    draw: Callable[[Axes], object]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Parts above one another over one axis; the first alone tells most."""
+
+    parts: tuple[Part, ...]
+    x_label: str = ""
+
+
+def draw_pictures(found: Sequence[Picture], *, ax: Axes | None, make: Callable[..., Figure] = Figure) -> Axes:
+    """Draw pictures one under another in a figure made by `make`, or the only one's first part into given axes.
+
+    Raises
+    ------
+    SetupError
+        When there is nothing to draw, or more than the axes given can hold.
+    """
+    if not found:
+        raise SetupError("there is nothing to draw: the value holds no line, mode or channel")
+    if ax is not None:
+        if len(found) > 1:
+            raise SetupError(f"it takes {len(found)} pictures: select channels of one unit, or leave ax out")
+        found[0].parts[0].draw(ax)
+        ax.set_xlabel(found[0].x_label)
+        return ax
+    shown = found[:MOST_PICTURES]
+    parts = [part for picture in shown for part in picture.parts]
+    with look():
+        heights = [part.height_in for part in parts]
+        figure = make(figsize=(WIDTH_IN, sum(heights) + LEGEND_IN * len(shown)), layout="constrained")
+        stack: list[Axes] = list(figure.subplots(len(parts), 1, squeeze=False, height_ratios=heights)[:, 0])
+        for axes, part in zip(stack, parts, strict=True):
+            part.draw(axes)
+        _share(stack, shown)
+        if len(found) > len(shown):
+            figure.supxlabel(f"the first {len(shown)} of {len(found)} pictures; select channels for the others")
+    return stack[0]
+
+
+def _share(stack: Sequence[Axes], shown: Sequence[Picture]) -> None:
+    """Let the parts of each picture share their axis, and name it below the last."""
+    ends = np.cumsum([len(picture.parts) for picture in shown]).tolist()
+    for (first, last), picture in zip(pairwise([0, *ends]), shown, strict=True):
+        for axes in stack[first + 1 : last]:
+            axes.sharex(stack[first])
+        for axes in stack[first : last - 1]:
+            axes.tick_params(labelbottom=False)
+        stack[last - 1].set_xlabel(picture.x_label)
+
+
+@singledispatch
+def pictures(value: object) -> list[Picture]:
+    """Give the pictures of a value, one for each unit and reference."""
+    if isinstance(value, Value) and value.AXES and getattr(value, next(iter(value.AXES))).dtype.kind in "fci":
+        return [Picture((Part(LINES_IN, partial(_draw_lines, value=value)),), plain(value.ROWS))]
+    raise SetupError(f"a {type(value).__name__} has no picture; take its fields")
+
+
+@pictures.register
+def _(value: TimeSeries) -> list[Picture]:
+    style = Style.of_channels(value.channels)
+    return [
+        Picture((Part(LINES_IN, partial(_draw_waveforms, series=value, group=group, style=style)),), "Time [s]")
+        for group in groups(value.channels)
+    ]
+
+
+@pictures.register
+def _(value: PowerSpectralDensity) -> list[Picture]:
+    style = Style.of_channels(value.channels)
+    return [
+        Picture(
+            (Part(density.HEIGHT_IN, partial(density.draw_densities, density=value, group=group, style=style)),),
+            "Frequency [Hz]",
+        )
+        for group in groups(value.channels)
+    ]
+
+
+@pictures.register
+def _(value: FrequencyResponse) -> list[Picture]:
+    style = Style.of_channels((*value.references, *value.responses))
+    found = []
+    for panel in panels(value):
+        drawn = [frequency_response.draw_magnitude, frequency_response.draw_phase]
+        if frequency_response.is_coherent(panel):
+            drawn.append(frequency_response.draw_coherence)
+        parts = tuple(
+            Part(height_in, partial(draw, panel=panel, style=style))
+            for draw, height_in in zip(drawn, frequency_response.HEIGHTS_IN, strict=False)
+        )
+        found.append(Picture(parts, "Frequency [Hz]"))
+    return found
+
+
+@pictures.register
+def _(value: Coherence) -> list[Picture]:
+    style = Style.of_channels(value.responses)
+    return [Picture((Part(LINES_IN, partial(_draw_coherence, coherence=value, style=style)),), "Frequency [Hz]")]
+
+
+@pictures.register
+def _(value: Waterfall) -> list[Picture]:
+    style = Style.of_channels(value.channels, origin_ns=value.start_time_ns)
+    return [
+        Picture((Part(LINES_IN, partial(_draw_waterfall, fall=value, row=row, style=style)),), "Time [s]")
+        for row in range(len(value.channels))
+    ]
+
+
+@pictures.register
+def _(value: ModeSet) -> list[Picture]:
+    if not value.frequency_hz.size:
+        return []
+    height_in = 0.9 + CELL_IN * len(value.channels)
+    return [Picture((Part(height_in, partial(_draw_shapes, modes=value)),), "Mode: Hz")]
+
+
+@pictures.register
+def _(value: StabilisationDiagram) -> list[Picture]:
+    numbers = np.unique(value.mode[value.mode >= 0])
+    modes_hz = np.array([float(value.frequency_hz[value.mode == number].mean()) for number in numbers])
+    draw = partial(draw_stabilisation, diagram=value, modes_hz=modes_hz)
+    return [Picture((Part(STABILISATION_IN, draw),), "Frequency [Hz]")]
+
+
+@pictures.register
+def _(value: ModalAssurance) -> list[Picture]:
+    if not value.values.size:
+        return []
+    return [Picture((Part(1.2 + CELL_IN * value.a_hz.size, partial(_draw_assurance, found=value)),), "Mode of b: Hz")]
+
+
+@pictures.register
+def _(value: Simulation) -> list[Picture]:
+    return [*pictures(value.outputs), *pictures(value.inputs)]
+
+
+@pictures.register
+def _(value: InfluenceTable) -> list[Picture]:
+    rows = value.log_derivative.shape[0]
+    height_in = 1.3 + influence.ROW_IN * rows
+    return [Picture((Part(height_in, partial(influence.draw_influence, table=value)),))]
+
+
+@pictures.register
+def _(value: Chart) -> list[Picture]:
+    return [
+        Picture((Part(chart_height_in(value), partial(draw_chart, chart=value)),), plain(printed_unit(value.x_label)))
+    ]
+
+
+@pictures.register
+def _(value: InstrumentReading) -> list[Picture]:
+    return [picture for chart in value.charts for picture in pictures(chart)]
+
+
+@pictures.register
+def _(value: Study) -> list[Picture]:
+    held: list[Any] = [*value.densities, value.response, value.modes]
+    return [picture for one in held if one is not None for picture in pictures(one)]
+
+
+def _draw_waveforms(axes: Axes, series: TimeSeries, group: Group, style: Style) -> None:
+    for row in group.rows:
+        values = series.values[row].astype(np.float64)
+        if series.valid is not None:
+            values[~series.valid[row]] = np.nan
+        chosen, _ = thin(values, limit=POINTS)
+        channel = series.channels[row]
+        axes.plot(
+            chosen / series.sample_rate_hz,
+            values[chosen],
+            color=paint(style.on_light(channel)),
+            linewidth=0.6,
+            label=plain(style.labels[channel.name]),
+        )
+    axes.set_xlim(0.0, series.duration_s)
+    axes.set_ylabel(group.title)
+    legend(axes)
+
+
+def _draw_coherence(axes: Axes, coherence: Coherence, style: Style) -> None:
+    for channel, values in zip(coherence.responses, coherence.values, strict=True):
+        colour = paint(style.on_light(channel))
+        axes.plot(coherence.frequency_hz, values, color=colour, label=plain(style.labels[channel.name]))
+    axes.set_xlim(coherence.frequency_hz[0], coherence.frequency_hz[-1])
+    axes.set_ylim(0, 1.04)
+    axes.set_ylabel(f"{coherence.kind.capitalize()} coherence [1]")
+    legend(axes)
+
+
+def _draw_waterfall(axes: Axes, fall: Waterfall, row: int, style: Style) -> None:
+    level = waterfall.level_of(fall, row)
+    image = waterfall.draw_waterfall(axes, fall, level, waterfall.colour_limits([level]), style)
+    waterfall.add_scale(image, [axes], Group(name="", unit=fall.channels[row].unit, rows=(row,)))
+    axes.set_title(plain(style.labels[fall.channels[row].name]), loc="left", pad=2)
+    axes.set_ylabel("Frequency [Hz]")
+
+
+def _draw_shapes(axes: Axes, modes: ModeSet) -> None:
+    """Draw the real part of every shape as a column, blue and orange to both sides of white."""
+    style = Style.of_channels(modes.channels)
+    axes.grid(visible=False)
+    image = axes.imshow(modes.shapes.real.T, vmin=-1, vmax=1, cmap=mpl.colormaps["PuOr"], aspect="auto")
+    labels = [style.labels[channel.name] for channel in modes.channels]
+    name_cells(axes, labels, mode_ticks(modes))
+    bar = axes.figure.colorbar(image, ax=axes, aspect=25, pad=0.02)
+    bar.set_label("Re ψ, largest 1")
+    bar.outline.set_linewidth(0.0)
+
+
+def _draw_assurance(axes: Axes, found: ModalAssurance) -> None:
+    rows, columns = (
+        [f"{row + 1}: {hertz(hz)}" if np.isfinite(hz) else str(row + 1) for row, hz in enumerate(numbers.tolist())]
+        for numbers in (found.a_hz, found.b_hz)
+    )
+    draw_mac(axes, found.values, rows=rows, columns=columns)
+    axes.set_ylabel("Mode of a: Hz")
+
+
+def _draw_lines(axes: Axes, value: Value) -> None:
+    """Draw the main field of any value over its rows, a line for each channel."""
+    name, along = next(iter(value.AXES.items()))
+    numbers = np.moveaxis(getattr(value, name), along.index(value.ROWS), -1)
+    flat = np.abs(numbers) if np.iscomplexobj(numbers) else numbers
+    others = [one for one in along if one != value.ROWS]
+    labels = [str(label) for label in value.coordinate(others[0])] if len(others) == 1 else []
+    for place, line in enumerate(flat.reshape(-1, flat.shape[-1])):
+        label = plain(labels[place]) if labels else None
+        axes.plot(value.coordinate(value.ROWS), line, color=paint(ON_LIGHT[place % len(ON_LIGHT)]), label=label)
+    unit = value.unit_at(name, (0,) * len(others))
+    axes.set_ylabel(f"{name} [{printed_unit(unit)}]" if unit else name)
+    legend(axes)
