@@ -120,8 +120,7 @@ def commands_along(poses: Matrix) -> Commands:
 
 def run(machine: Machine, commands: Commands) -> Motion:
     stamps = commands.t_s[commands.t_s > -0.5 / RATE_HZ]
-    # A sample of the machine is what it is after the step that begins at its stamp.
-    return replace(simulate(machine, commands, stamps - STEP_S, step_s=STEP_S, resolution=RESOLUTION), t_s=stamps)
+    return simulate(machine, commands, stamps, step_s=STEP_S, resolution=RESOLUTION)
 
 
 def write(robot: Description, motion: Motion, commands: Commands, path: Path) -> None:
@@ -385,7 +384,7 @@ def main() -> None:
 def logs(folder: Path, chosen: argparse.Namespace) -> Iterator[tuple[Made, Path, Path]]:
     robot, description = describe(chosen.robot, tool=TOOL), folder / "robot.xml"
     (bare := folder / "robot.urdf").write_text(robot.urdf, encoding="utf-8")
-    poses = chladni.excite(bare, rate_hz=RATE_HZ, seed=chosen.seed).position
+    poses = chladni.excite(bare, sample_rate_hz=RATE_HZ, seed=chosen.seed).position
     servo, commands, count = servo_of(robot, poses), commands_along(poses), len(robot.joints)
     description.write_text(mjcf(robot, servo), encoding="utf-8")
     model = true_model(np.random.default_rng(chosen.seed), robot.model, chosen.inertia)

@@ -44,8 +44,8 @@ class Driven:
     Attributes
     ----------
     asked
-        ``[joint, step]``: command (or measured effort) as it arrives, held over the step; of all runs, one after
-        another.
+        ``[joint, step]``: command (or measured effort) as it arrives where each step begins, a mean over half a step
+        before and after; of all runs, one after another.
     kind
         Of each joint: what is asked of it.
     position, velocity
@@ -208,8 +208,11 @@ class _Run:
         self._forward = factor[:, None] * self._filtered(asked)
         self._kp, self._kd = kp * positions, kd * (positions | velocities)
         self._limit, self._lag_s = limit, self._row("lag_s")
-        # Damping is stiff, so it goes into the integrator; what a limit or a lag takes from it is given back.
-        self._implicit = np.where((self._lag_s > 0) | self._between.soft, 0.0, self._kd)
+        # A step's torque is that at its begin: half of the damping is implicit, as by the trapezoidal rule, and more
+        # where that is too stiff. What a limit or a lag takes from it is given back.
+        stiff = self._kd - self._inertia() / self._driven.step_s
+        implicit = np.maximum(0.5 * self._kd, stiff)
+        self._implicit = np.where((self._lag_s > 0) | self._between.soft, 0.0, implicit)
         _damping(self._model)[self._dofs] += self._implicit
 
     def _filtered(self, asked: Real) -> Real:

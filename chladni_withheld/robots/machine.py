@@ -198,9 +198,11 @@ def simulate(machine: Machine, commands: Commands, t_s: Matrix, *, step_s: float
         t = begin + step * step_s
         if step % run.steps_per_period == 0:
             run.control(t)
+        state = run.state()
         run.advance(t)
         if step == wanted[len(rows)]:
-            rows.append(run.sample())
+            # What accelerates is known when the step has been made.
+            rows.append(run.sample(state))
     found = [np.array(each).T for each in zip(*rows, strict=True)]
     return Motion(t_s=t_s, imu=run.sensed(begin), **dict(zip(_SAMPLED, found, strict=True)))
 
@@ -301,14 +303,17 @@ class _Run:
         self.z = (before + self.h * s) / (1.0 + self.h * law.bristle * fast / level)
         return force + law.bristle * self.z + law.damping * (self.z - before) / self.h
 
-    def sample(self) -> tuple[Matrix, ...]:
-        """What is logged, in the order of `_SAMPLED`."""
-        if self.machine.transmission.logs_motor:
-            reading, speed, acceleration = self.theta, self.omega, self.turning
-        else:
-            reading, speed, acceleration = self.q, self.v, self.alpha
-        base = np.zeros(0)
-        return (reading + self.machine.offset, speed, acceleration, self.asked, self.given, self.q, self.v, base)
+    def state(self) -> tuple[Matrix, ...]:
+        """Reading and speed of the encoders, positions and speeds of the links, and the base's."""
+        motor = self.machine.transmission.logs_motor
+        reading, speed = (self.theta, self.omega) if motor else (self.q, self.v)
+        return reading + self.machine.offset, speed, self.q, self.v, np.zeros(0)
+
+    def sample(self, state: tuple[Matrix, ...]) -> tuple[Matrix, ...]:
+        """What is logged of the state that a step began with, in the order of `_SAMPLED`."""
+        reading, speed, q, v, base = state
+        acceleration = self.turning if self.machine.transmission.logs_motor else self.alpha
+        return reading, speed, acceleration, self.asked, self.given, q, v, base
 
     def sensed(self, _begin: float) -> Matrix:
         """What an IMU felt, of motions that began then; a base that is fixed has none."""
@@ -339,10 +344,13 @@ class _AfloatRun(_Run):
         self.pose = self.pose * pin.exp6(pin.Motion(self.h * self.twist))
         return found[6:]
 
-    def sample(self) -> tuple[Matrix, ...]:
+    def state(self) -> tuple[Matrix, ...]:
         """With the base."""
-        base = np.concatenate([pin.SE3ToXYZQUAT(self.pose), self.twist, self.push])
-        return (*super().sample()[:-1], base)
+        return (*super().state()[:-1], np.concatenate([pin.SE3ToXYZQUAT(self.pose), self.twist]))
+
+    def sample(self, state: tuple[Matrix, ...]) -> tuple[Matrix, ...]:
+        """With the base."""
+        return (*super().sample(state)[:-1], np.concatenate([state[-1], self.push]))
 
     def sensed(self, begin: float) -> Matrix:
         """Means over the sensor's periods, stamped at their ends."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lsim
 
 from chladni.robots.loading import load_robot
 from chladni.robots.machine import Coupling, Machine, as_described, physical
@@ -51,6 +52,22 @@ def courses(machine: Machine, *, asked: float, kind: str, start: float, speed: f
         velocity=np.array([[speed], [0.0]]), steps=np.array([STEPS]), every=1, step_s=STEP_S,
     )  # fmt: skip
     return run(machine, ("one", "two"), driven)
+
+
+def test_a_servo_follows_with_an_error_of_second_order_in_the_step(rotors: Machine) -> None:
+    kp, kd, step_s = 60.0, 2.0, 1e-3
+    time_s = np.arange(3000) * step_s
+    command = 0.5 * np.sin(2.0 * np.pi * 1.5 * time_s)
+    machine = with_first(rotors, servo=Servo(kind="position", kp=kp, kd=kd, limit=None, actuator=None))
+    # From rest; between samples a command of many steps is a straight line.
+    _, exact, _ = lsim(([kp], [INERTIA, kd, kp]), command, time_s)
+    driven = Driven(
+        asked=np.stack([command, 0.0 * command]), kind=("position", "effort"), position=np.zeros((2, 1)),
+        velocity=np.zeros((2, 1)), steps=np.array([time_s.size]), every=1, step_s=step_s,
+    )  # fmt: skip
+    found = run(machine, ("one", "two"), driven)[0]
+    # Half a step late, or early, would be 2e-3.
+    np.testing.assert_allclose(found, exact, atol=1e-4)
 
 
 # A step of Euler's method errs by half of its acceleration times its length.

@@ -17,6 +17,8 @@ OF_THE_LOG = "of the log"
 _READING, _TILT, _MASS = 0.05, 0.1, 0.5
 #: A payload over the heaviest link, at so many metres.
 _PAYLOAD, _REACH_M = 0.3, 0.1
+#: Radius of gyration of what is carried, m, before a log is seen.
+_EXTENT_M = 0.05
 #: Times that reach: where nothing that is carried has its centre.
 _FAR = 3.0
 
@@ -50,19 +52,20 @@ def bodies(torques: Torques) -> Iterator[Term]:
 
 
 def payloads(torques: Torques) -> Iterator[Term]:
-    """Masses that links carry, as points where they were found to be."""
+    """Masses that links carry, with the inertia of a ball about where their centres were found to be."""
     heavy = _PAYLOAD * float(np.max(inertial_numbers(torques.robot)[:, 0]))
     load = (
         Number(name="mass", unit="kg", scale=heavy, least=0.0),
         *(Number(name=f"moment_{axis}", unit="kg m", scale=heavy * _REACH_M) for axis in "xyz"),
+        Number(name="inertia", unit="kg m^2", scale=heavy * _EXTENT_M**2, least=0.0),
     )
     moved = {joint.link for joint in torques.robot.joints}
     for name, _, columns in _links(torques):
         # What is fixed to a link moves as one with it: a payload on it is one on the link.
         if name in moved:
-            around = _moments_of_point(torques.guesses.centre_m.get(name, np.zeros(3)))
-            point = np.einsum("p,pjk->jk", around, columns[4:])
-            whole = np.concatenate([columns[:1] + point, columns[1:4]])
+            around = _slopes_of_point(torques.guesses.centre_m.get(name, np.zeros(3)))
+            point = columns[:4] + np.tensordot(around, columns[4:], 1)
+            whole = np.concatenate([point, np.sum(columns[4:7], axis=0, keepdims=True)])
             yield Term(word="payload", site=name, columns=whole, numbers=load, reach=_FAR * _REACH_M)
 
 
@@ -74,7 +77,14 @@ def _links(torques: Torques) -> Iterator[tuple[str, Real, Real]]:
             yield name, own, each
 
 
-def _moments_of_point(centre: Real) -> Real:
-    """Moments of inertia of a unit of mass at a place, about the origin: xx, yy, zz, xy, xz, yz."""
-    x, y, z = centre
-    return np.array([y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
+def _slopes_of_point(centre: Real) -> Real:
+    """``[4, 6]``: by how much a point's moments of inertia (xx, yy, zz, xy, xz, yz) grow with mass and first moment.
+
+    Of ``(h.h 1 - h h') / m`` about the origin, at h = m centre. It's of first degree in both, so that slopes make all
+    of it.
+    """
+    outer = np.outer(centre, centre)
+    slopes = [np.trace(outer) * -np.eye(3) + outer]
+    for along, axis in zip(centre, np.eye(3), strict=True):
+        slopes.append(2.0 * along * np.eye(3) - np.outer(axis, centre) - np.outer(centre, axis))
+    return np.array([one[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]] for one in slopes])

@@ -287,7 +287,7 @@ class Contest:
         for term in terms:
             count = len(term.numbers)
             if term.reach is not None:
-                found.append((place, place + count, float(term.scale[1] / term.scale[0] / term.reach)))
+                found.append((place, place + 4, float(term.scale[1] / term.scale[0] / term.reach)))
             place += count
         return found
 

@@ -181,7 +181,7 @@ class _Reading:
                 if term.word == "parameter" and term.site == f"{name}.mass":
                     own *= max(1.0 + float(values[0]), 0.0)
                 if term.word == "payload" and term.site == name and values[0] > 0:
-                    own += _point(values)
+                    own += _carried(values)
             change = np.array([self._within.get(f"{name}.{each}", 0.0) for each in INERTIAL_NAMES]) @ spread[link]
             found[link] = physical(own, own + change) if own[0] > 0 else own
         return found
@@ -202,11 +202,11 @@ def _towards(described: float, found: float, share: float) -> float:
     return described + share * (found - described)
 
 
-def _point(values: Real) -> Real:
-    """Numbers of a point mass with a first moment."""
-    mass, moment = float(values[0]), values[1:]
-    inertia = (moment @ moment * np.eye(3) - np.outer(moment, moment)) / mass
-    return np.concatenate([values, inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
+def _carried(values: Real) -> Real:
+    """Numbers of a mass with a first moment, and an inertia of its own about any axis."""
+    mass, moment = float(values[0]), values[1:4]
+    inertia = (moment @ moment * np.eye(3) - np.outer(moment, moment)) / mass + max(float(values[4]), 0.0) * np.eye(3)
+    return np.concatenate([values[:4], inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
 
 
 Law = Callable[[MachineJoint, Term, Real, Torques], MachineJoint]
@@ -355,13 +355,11 @@ def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -
     )
     step_s = interval_s * skip / every
     samples = [np.arange(a, b, skip) for a, b in runs]
-    at_s = [
-        log.time_s[a] + step_s * (np.arange(one.size * every) + 0.5)
-        for (a, _), one in zip(runs, samples, strict=True)
-    ]
+    at_s = [log.time_s[a] + step_s * np.arange(one.size * every) for (a, _), one in zip(runs, samples, strict=True)]
     starts = [a for a, _ in runs]
     driven = Driven(
-        asked=_asked(machine, torques, np.concatenate(at_s)), kind=_kinds(torques), every=every, step_s=step_s,
+        asked=_asked(machine, torques, np.concatenate(at_s), step_s), kind=_kinds(torques), every=every,
+        step_s=step_s,
         position=torques.fast_position[:, starts], velocity=torques.fast_velocity[:, starts],
         steps=np.array([one.size for one in at_s]), base=_base(machine, torques, np.concatenate(at_s)),
     )  # fmt: skip
@@ -395,16 +393,17 @@ def _kinds(torques: Torques) -> tuple[str, ...]:
     return (kind,) * len(torques.log.joints)
 
 
-def _asked(machine: Machine, torques: Torques, at_s: Real) -> Real:
-    """``[joint, step]``: commands as they arrive, held; or measured efforts."""
+def _asked(machine: Machine, torques: Torques, at_s: Real, step_s: float) -> Real:
+    """``[joint, step]``: commands as they arrive, held, over half a step before and after; or measured efforts."""
     log = torques.log
     if _by_effort(torques):
         return np.array([np.interp(at_s, log.time_s, row) for row in torques.unlimited])
     late = {one.joint.name: one.delay_s for one in machine.joints}
     found = np.zeros((len(log.joints), at_s.size))
     for row, (name, (starts, values)) in enumerate(zip(log.joints, log.command_messages or (), strict=True)):
-        place = np.searchsorted(starts, at_s - late[name], side="right") - 1
-        found[row] = values[np.maximum(place, 0)]
+        for aside in (-0.25, 0.25):
+            place = np.searchsorted(starts, at_s + aside * step_s - late[name], side="right") - 1
+            found[row] += 0.5 * values[np.maximum(place, 0)]
     return found
 
 

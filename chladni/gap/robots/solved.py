@@ -172,7 +172,7 @@ def _guesses(torques: Torques, fit: Fit, forms: Forms) -> Guesses:
         if term.word == "delay":
             late[term.site] = float(values[0]) - torques.robot.delay_s * (term.site == ALL_COMMANDS)
         elif term.word == "payload" and values[0] > _TOLD_BY * deviations[0]:
-            centres[term.site] = np.asarray(values[1:] / values[0])
+            centres[term.site] = np.asarray(values[1:4] / values[0])
         elif term.word == "encoder_offset" and term.variant == OF_THE_LOG:
             offset[term.site] = float(values[0])
     return Guesses(late_s=late, centre_m=centres, offset=offset, forms=forms)

@@ -100,7 +100,7 @@ class Term:
     rare
         Whether few machines have it.
     reach
-        How far the other numbers, as a vector, can lie from the first as its arm: a mass and its first moment.
+        How far the next three numbers, as a vector, can lie from the first as its arm: a mass and its first moment.
     """
 
     word: str

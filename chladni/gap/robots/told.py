@@ -29,10 +29,11 @@ def _controller_gain(_: Term, values: Real, deviations: Real) -> Numbers:
 def _payload(_: Term, values: Real, deviations: Real) -> Numbers:
     mass = float(values[0])
     found = {"mass": (mass, float(deviations[0]), "kg")}
-    for axis, moment, deviation in zip("xyz", values[1:], deviations[1:], strict=True):
+    for axis, moment, deviation in zip("xyz", values[1:4], deviations[1:4], strict=True):
         # Where the mass is hardly known, so is its place.
         spread = float(np.hypot(deviation, moment * deviations[0] / mass) / abs(mass)) if mass else np.inf
         found[axis] = (float(moment) / mass if mass else 0.0, spread, "m")
+    found["inertia"] = (float(values[4]), float(deviations[4]), "kg m^2")
     return found
 
 
