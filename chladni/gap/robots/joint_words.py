@@ -16,8 +16,8 @@ from chladni.signals.arrays import Real
 _STRIBECK = (0.05, 0.15, 0.4)
 #: Of a joint's motion: over which friction of either way builds up. A joint that yields less slides.
 _SLIDES, _YIELDS = (0.01, 0.03, 0.08), (0.16, 0.32, 0.64)
-#: Variant of friction.
-ALONG_THE_WAY = "along the way"
+#: Variants of friction.
+ALONG_THE_WAY, PRESLIDING = "along the way", "presliding"
 #: Quantiles of a joint's way at which a stop begins.
 _STOPS = (0.6, 0.75, 0.85, 0.93)
 #: Friction that grows with the load, before a log is seen.
@@ -34,7 +34,7 @@ def friction(torques: Torques) -> Iterator[Term]:
         often, speed = usual(torques, row), rms(torques.velocity[row])
         force, damping, _ = units(joint)
         sign, fast = torques.sign[row], torques.fast_velocity[row]
-        dry = Number(name="force", unit=force, scale=often, least=-joint.friction, nominal=joint.friction)
+        dry = _dry(torques, row, joint)
         one = partial(law, torques, row)
         yield one("coulomb_friction", (sign,), dry)
         wet = Number(
@@ -45,12 +45,27 @@ def friction(torques: Torques) -> Iterator[Term]:
         square = Number(name="coefficient", unit=unit, scale=often / speed**2, least=0.0)
         yield one("quadratic_damping", (torques.smooth(fast * np.abs(fast)),), square)
         # What the drive gives holds the friction itself: the load is what the motion needs.
-        carried = np.abs(torques.of_joints(torques.need.torque)[row]) * sign
+        carried = _load(torques, row) * sign
         by_load = Number(name="coefficient", unit="1", scale=_BY_LOAD, least=0.0)
         yield one("load_friction", (sign, carried), dry, by_load, plainer="coulomb_friction")
         yield _uneven(torques, row, dry)
-        yield from _stribeck(torques, row, joint, dry)
-        yield from _loops(torques, row, joint, dry)
+        yield from _stribeck(torques, row, joint, torques.fast_sign[row])
+        yield from _loops(torques, row, joint, dry, by_load)
+
+
+def bristles(torques: Torques) -> Iterator[Term]:
+    """Stribeck's law with friction that builds up over a short way, as it was found for Coulomb's."""
+    for row, joint in torques.rows:
+        usual_way = _SLIDES[0] * _motion(torques, row)
+        yields = torques.guesses.forms.get(("coulomb_friction", joint.name, PRESLIDING), usual_way)
+        built_up = _dahl(torques.fast_position[row], yields, torques.stretches)
+        yield from _stribeck(torques, row, joint, built_up, PRESLIDING)
+
+
+def _dry(torques: Torques, row: int, joint: RobotJoint) -> Number:
+    return Number(
+        name="force", unit=units(joint)[0], scale=usual(torques, row), least=-joint.friction, nominal=joint.friction
+    )
 
 
 def _uneven(torques: Torques, row: int, dry: Number) -> Term:
@@ -72,33 +87,48 @@ def way_of(torques: Torques, row: int) -> tuple[float, float, float]:
     return lowest, 0.5 * (lowest + highest), highest
 
 
-def _stribeck(torques: Torques, row: int, joint: RobotJoint, dry: Number) -> list[Term]:
+def _stribeck(torques: Torques, row: int, joint: RobotJoint, sign: Real, variant: str | None = None) -> list[Term]:
+    """Friction that is higher when slow, along ``[sample]`` that says which way."""
     fast, unit = torques.fast_velocity[row], "rad/s" if joint.kind == "hinge" else "m/s"
+    dry = _dry(torques, row, joint)
     rise = Number(name="rise", unit=dry.unit, scale=dry.scale, least=0.0)
+    constant = torques.smooth(sign)
 
     def make(speed: float) -> Term:
-        fades = np.exp(-((fast / speed) ** 2))
-        columns = (torques.sign[row], torques.smooth(torques.fast_sign[row] * fades))
-        return law(torques, row, "stribeck_friction", columns, dry, rise, plainer="coulomb_friction")
+        columns = (constant, torques.smooth(sign * np.exp(-((fast / speed) ** 2))))
+        return law(torques, row, "stribeck_friction", columns, dry, rise, variant=variant, plainer="coulomb_friction")
 
     grid = np.array(_STRIBECK) * rms(torques.velocity[row])
     return formed(make, grid, name="speed", unit=unit)
 
 
-def _loops(torques: Torques, row: int, joint: RobotJoint, dry: Number) -> Iterator[Term]:
+def _load(torques: Torques, row: int) -> Real:
+    """``[coarse]``: what the motion needs."""
+    return np.asarray(np.abs(torques.of_joints(torques.need.torque)[row]))
+
+
+def _motion(torques: Torques, row: int) -> float:
+    return float(np.std(torques.position[row])) + 1e-12
+
+
+def _loops(torques: Torques, row: int, joint: RobotJoint, dry: Number, by_load: Number) -> Iterator[Term]:
     """Dahl's loop: friction that builds up over a way (Dahl 1968), a short one where a joint slides."""
-    motion = float(np.std(torques.position[row])) + 1e-12
-    loop = Number(name="force", unit=dry.unit, scale=dry.scale, least=0.0)
-    for word, shares, number, variant in (
-        ("coulomb_friction", _SLIDES, dry, "presliding"),
-        ("hysteresis", _YIELDS, loop, None),
+    loop, load = replace(dry, least=0.0, nominal=0.0), _load(torques, row)
+    for word, shares, numbers, variant in (
+        ("coulomb_friction", _SLIDES, (dry,), PRESLIDING),
+        ("load_friction", _SLIDES, (dry, by_load), PRESLIDING),
+        ("hysteresis", _YIELDS, (loop,), None),
     ):
 
-        def make(yields: float, word: str = word, number: Number = number, variant: str | None = variant) -> Term:
+        def make(
+            yields: float, word: str = word, numbers: tuple[Number, ...] = numbers, variant: str | None = variant
+        ) -> Term:
             built_up = torques.smooth(_dahl(torques.fast_position[row], yields, torques.stretches))
-            return law(torques, row, word, (built_up,), number, variant=variant, rare=variant is None)
+            columns = (built_up, load * built_up)[: len(numbers)]
+            plainer = "coulomb_friction" if len(columns) > 1 else None
+            return law(torques, row, word, columns, *numbers, variant=variant, rare=variant is None, plainer=plainer)
 
-        yield from formed(make, np.array(shares) * motion, name="yield", unit=length(joint))
+        yield from formed(make, np.array(shares) * _motion(torques, row), name="yield", unit=length(joint))
 
 
 def _dahl(position: Real, yields: float, stretches: tuple[tuple[int, int], ...]) -> Real:

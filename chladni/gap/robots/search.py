@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from itertools import islice
 
 from chladni.gap.calibration import SAME
 from chladni.gap.robots.contest import Contest, Fit
@@ -134,8 +135,12 @@ def alternatives(contest: Contest, best: Fit, place: int, count: int, behind: fl
     without = contest.fit(rest, best)
     promised = contest.promise(without)
     least = next(nats for nats, term in promised if term is own) - behind
-    others = [term for nats, term in promised if term.key not in taken and term is not own and nats > least]
-    return [without, *(contest.fit([*rest, term], best) for term in others[:count])]
+    # Of each word the form that promises most.
+    others: dict[tuple[str, str], Term] = {}
+    for nats, term in promised:
+        if term.key not in taken and term is not own and nats > least:
+            others.setdefault(term.key, term)
+    return [without, *(contest.fit([*rest, term], best) for term in islice(others.values(), count))]
 
 
 def _best(fits: Sequence[Fit]) -> Fit:

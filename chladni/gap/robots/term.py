@@ -152,9 +152,8 @@ class Term:
         return np.array([one.nominal for one in self.numbers])
 
     def holds(self, other: "Term") -> bool:
-        """Whether this is another law with more numbers, of which the first are the other's."""
-        count = len(other.numbers)
-        return len(self.numbers) > count and np.array_equal(self.columns[:count], other.columns)
+        """Whether this law without its last number is the other's."""
+        return self.plainer == other.word and self.site == other.site
 
 
 def formed(

@@ -6,7 +6,7 @@ from dataclasses import replace
 from chladni.gap.records.diagnosis import PARAMETER
 from chladni.gap.robots.body_words import bodies, payloads, readings
 from chladni.gap.robots.drive_words import delays, drives
-from chladni.gap.robots.joint_words import coupled, friction, inertia, ripple, springs
+from chladni.gap.robots.joint_words import bristles, coupled, friction, inertia, ripple, springs
 from chladni.gap.robots.term import Form, Term
 from chladni.gap.robots.torques import FormKey, Torques
 from chladni.gap.robots.transmission_words import transmissions
@@ -24,6 +24,7 @@ _LASTING: Mapping[Maker, tuple[str, ...]] = {
     bodies: ("gravity_tilt", "misalignment", PARAMETER),
 }  # fmt: skip
 _MADE_ANEW: Mapping[Maker, tuple[str, ...]] = {
+    bristles: ("stribeck_friction",),
     readings: ("encoder_offset",),
     payloads: ("payload",),
     delays: ("delay",),
