@@ -152,8 +152,9 @@ def next_measurement(
     if sentences:
         return sentences[0]
     most = np.argsort(-contest.unknowns(best), kind="stable")
-    names = dict.fromkeys(contest.torques.name_of(row) for row in most.tolist())
-    return _look_first(robot, [name for name in names if name in unexplained])
+    torques = contest.torques
+    rows = [row for row in most.tolist() if torques.name_of(row) in unexplained]
+    return _look_first(robot, [torques.joints[row % len(torques.joints)] for row in rows])
 
 
 def _doubt(contest: Contest, best: Fit, place: int, name: Candidate) -> Doubt | None:
@@ -375,16 +376,16 @@ def _word(one: Candidate) -> str:
     return one.effect.replace("_", " ")
 
 
-def _look_first(robot: Robot, unexplained: Sequence[str]) -> str | None:
+def _look_first(robot: Robot, unexplained: Sequence[RobotJoint]) -> str | None:
     """Ask for slow and fast motions where no word explains: poses that return tell what it follows."""
-    for name in unexplained:
-        _, slow, fast, _ = _alone(robot.joint(name))
+    for joint in unexplained:
+        _, slow, fast, _ = _alone(joint)
         try:
             slow.made(robot, _MOST_HZ)
         except ChladniError:
             continue
         return (
-            f"No word explains what is missing at {visible(name)}: {slow.words}, then with --speed "
+            f"No word explains what is missing at {visible(joint.name)}: {slow.words}, then with --speed "
             f"{fast.shares.speed:g}, and diagnose both logs. {slow.command(robot)}"
         )
     return None

@@ -28,7 +28,8 @@ def searched(
     they're asked for: those explain a part of anything.
     """
     if begin is not None:
-        return _moved(contest, _tidied(contest, begin), progress)
+        # One term whose columns fit better now may stand for all.
+        return _moved(contest, _best([_tidied(contest, begin), *_more(contest, contest.nothing)]), progress)
     best = _moved(contest, contest.nothing, progress)
     if all(one.over_noise < SAME for one in best.left):
         return best

@@ -78,7 +78,7 @@ def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Re
             word=word, site=joint.name, columns=columns, numbers=numbers, rows=rows, variant=AT_LINK, rare=True
         )
     behind = torques.turned(row, -ahead, -rate, -acceleration)
-    whole = np.concatenate([-behind[None], at_row(torques, row, torques.acceleration[row])[:, : len(behind)]])
+    whole = np.concatenate([behind[None], at_row(torques, row, torques.acceleration[row])[:, : len(behind)]])
     yield Term(
         word=word, site=joint.name, columns=whole, numbers=(number, rotor), rows=(row,), variant=AT_MOTOR, rare=True
     )

@@ -45,6 +45,14 @@ def test_a_law_is_named_with_its_number(word: str, tmp_path: Path) -> None:
     assert found.gap.after < 0.5 * found.gap.before
 
 
+def test_elasticity_is_told_where_the_log_reads_the_motor(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(SECONDS)
+    machine = changed(as_described(robot), 0, transmission=motor(stiffness=400.0, logs_motor=True))
+    found = diagnose_robot(robot, joint_log_of(robot, read(machine, command), command=command))
+    assert [(one.effect, one.site) for one in found.causes] == [("joint_elasticity", "shoulder")]
+    assert found.causes[0].parameters["stiffness"].value == pytest.approx(400.0, rel=0.15)
+
+
 def test_friction_that_changes_along_the_way_is_told_at_its_ends(tmp_path: Path) -> None:
     robot, command = arm(tmp_path), commands(SECONDS)
     rubs = Uneven(places=(-1.0, 0.0, 1.0), beyond=(3.0, 0.0, -3.0))
