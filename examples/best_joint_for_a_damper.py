@@ -1,8 +1,7 @@
 """Where a damper helps a robot arm most, and what its stiffness does: influence, best values, the best joint."""
 
 import chladni
-from chladni.models.analysis.damper_placement import Damper, place_damper
-from chladni.models.instruments.catalogue import INSTRUMENTS
+from chladni import INSTRUMENTS, Damper, place_damper
 
 
 def main() -> None:

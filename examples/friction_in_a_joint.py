@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 import chladni
-from chladni.models.excitations.multisine import Multisine
-from chladni.models.instruments.robot_arm import arm_model
+from chladni import Multisine, arm_model
 
 SECONDS, RATE_HZ = 40.0, 1000.0
 

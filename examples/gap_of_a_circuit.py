@@ -12,15 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import chladni
-from chladni.apps.explained_model import explained_model
-from chladni.apps.gap_evidence import gap_evidence
-from chladni.gap.comparison.measuring import measurement_of
-from chladni.gap.comparison.quiet_floor import quiet_floor
-from chladni.gap.plant.free_run import FreeRun
-from chladni.gap.tuning.output_error import fit_output_error
-from chladni.models.core.model import Model
-from chladni.viewers.figures.gap_sheet import save_gap_sheet
-from chladni.viewers.gap_summary import summary
+from chladni import Model, explained_model, tuned_model
 
 INPUT, OUTPUT = "/input.value", "/output.value"
 #: Samples of the growing noise, then of two of the ten multisines, without the first one's transient.
@@ -46,13 +38,6 @@ def part(series: chladni.TimeSeries, samples: slice) -> chladni.TimeSeries:
     return series.window(start_s=max(samples.start - 0.5, 0.0) / rate_hz, end_s=(samples.stop - 0.5) / rate_hz)
 
 
-def best_linear(model: Model, series: chladni.TimeSeries) -> Model:
-    """Give the model with the parameters that suit it best when nothing is added."""
-    measured, _ = measurement_of(model, series, log="multisines")
-    fit = fit_output_error(FreeRun(model, measured), quiet_floor(measured))
-    return model.with_values(fit.values)
-
-
 def error_mv(model: Model, series: chladni.TimeSeries) -> float:
     """RMS of measured less simulated, free run from rest, but for a constant."""
     outputs = chladni.simulate(model, series).outputs
@@ -73,15 +58,16 @@ def main() -> None:
     series = smooth_between_samples(measured)
     model = chladni.load_model(data / "models" / "silverbox.toml")
     found = chladni.diagnose_gap(model, part(series, MULTISINES))
-    print(*summary(found), sep="\n")
+    print(*found.summary(), sep="\n")
     explained = explained_model(model, found)
     growing = part(series, GROWING)
     print(f"growing noise, free run: nominal {error_mv(model, growing):.2f} mV", end=", ")
-    print(f"best linear {error_mv(best_linear(model, part(series, MULTISINES)), growing):.2f} mV", end=", ")
+    print(f"best linear {error_mv(tuned_model(model, part(series, MULTISINES)), growing):.2f} mV", end=", ")
     print(f"explained {error_mv(explained, growing):.2f} mV")
     print(f"the same with straight lines between samples: {error_mv(explained, part(measured, GROWING)):.2f} mV")
     if len(sys.argv) > 1:
-        print("picture:", save_gap_sheet(gap_evidence(found), Path(sys.argv[1])))
+        found.plot().figure.savefig(sys.argv[1], dpi=200)
+        print("picture:", sys.argv[1])
 
 
 if __name__ == "__main__":

@@ -11,13 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import chladni
-from chladni.apps.explained_model import explained_model
-from chladni.apps.gap_evidence import gap_evidence
-from chladni.gap.records.diagnosis import Diagnosis
-from chladni.models.core.model import Model
-from chladni.viewers.engineering import percent
-from chladni.viewers.figures.gap_sheet import save_gap_sheet
-from chladni.viewers.gap_summary import headline
+from chladni import Diagnosis, Model, explained_model
 
 POSITION, FORCE = "/damper.position[0]", "/damper.effort[0]"
 #: Name of the log, and the seconds of it that are diagnosed: some strokes tell as much as all.
@@ -33,7 +27,7 @@ def force_error(model: Model, series: chladni.TimeSeries) -> float:
 
 def alternatives(found: Diagnosis) -> str:
     """Name the first effects that were weighed, with the error that each leaves."""
-    return ", ".join(f"{one.effect} {percent(one.gap)}" for one in found.ranking[:3] if one.gap is not None)
+    return ", ".join(f"{one.effect} {one.gap:.1%}" for one in found.ranking[:3] if one.gap is not None)
 
 
 def main() -> None:
@@ -49,12 +43,13 @@ def main() -> None:
             series = log.read([POSITION, FORCE])
         found = chladni.diagnose_gap(nominal, series.window(end_s=end_s))
         explained = explained_model(nominal, found)
-        print(f"{name}: {headline(found)}")
+        print(f"{name}: {found.summary()[0]}")
         print(f"  weighed, with the error left: {alternatives(found)}")
         before, after = force_error(nominal, series), force_error(explained, series)
         print(f"  force error on all {series.duration_s:.1f} s: nominal {before:.0%}, explained {after:.1%}")
     if found is not None and len(sys.argv) > 1:
-        print("picture:", save_gap_sheet(gap_evidence(found), Path(sys.argv[1])))
+        found.plot().figure.savefig(sys.argv[1], dpi=200)
+        print("picture:", sys.argv[1])
 
 
 if __name__ == "__main__":

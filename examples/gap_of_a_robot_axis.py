@@ -14,14 +14,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 
 import chladni
-from chladni.apps.explained_model import explained_model
-from chladni.apps.gap_evidence import gap_evidence
-from chladni.models.integrator.known_motion import force_along_motion
-from chladni.models.structures.structure_input import StructureInput
-from chladni.models.structures.structure_model import StructureModel
-from chladni.signals.arrays import Real
-from chladni.viewers.figures.gap_sheet import save_gap_sheet
-from chladni.viewers.gap_summary import summary
+from chladni import StructureInput, StructureModel, explained_model, force_along_motion
 
 POSITION, FORCE = "/axis.position[0]", "/axis.effort[0]"
 COMMAND, PULSES = "/command.position[0]", "/pulses.effort[0]"
@@ -29,13 +22,13 @@ COMMAND, PULSES = "/command.position[0]", "/pulses.effort[0]"
 BAND_HZ = 50.0
 
 
-def velocity_and_acceleration(series: chladni.TimeSeries) -> tuple[Real, Real]:
+def velocity_and_acceleration(series: chladni.TimeSeries) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives of the measured position, by a spline of degree 5."""
     spline = make_interp_spline(series.times_s(), series.values[series.index(POSITION)], k=5)
     return spline.derivative(1)(series.times_s()), spline.derivative(2)(series.times_s())
 
 
-def low_passed(signal: Real, rate_hz: float) -> Real:
+def low_passed(signal: np.ndarray, rate_hz: float) -> np.ndarray:
     """Without phase, but for the first and last half second."""
     passed = sosfiltfilt(butter(4, BAND_HZ, fs=rate_hz, output="sos"), signal)
     return np.asarray(passed[int(rate_hz / 2) : -int(rate_hz / 2)])
@@ -84,7 +77,7 @@ def main() -> None:
         return
     # Half of the log: the other half is for the check, as emps_pulses is.
     found = chladni.diagnose_gap(data / "models" / "emps.toml", data / "emps.mcap", end_s=12.4)
-    print(*summary(found), sep="\n")
+    print(*found.summary(), sep="\n")
     nominal = chladni.load_model(data / "models" / "emps_closed_loop.toml")
     explained = explained_model(nominal, found)
     for name, channels in (("emps", ()), ("emps_pulses", (PULSES,))):
@@ -97,7 +90,8 @@ def main() -> None:
                 f"in its loop {force:.1%}, position {1e6 * position_m:.1f} um"
             )
     if len(sys.argv) > 1:
-        print("picture:", save_gap_sheet(gap_evidence(found), Path(sys.argv[1])))
+        found.plot().figure.savefig(sys.argv[1], dpi=200)
+        print("picture:", sys.argv[1])
 
 
 if __name__ == "__main__":

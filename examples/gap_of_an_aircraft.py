@@ -18,10 +18,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import chladni
-from chladni.apps.level_location import LevelLocation, locate_from_levels
-from chladni.gap.comparison.levels import compare_levels
-from chladni.gap.records.measurement import Measurement
-from chladni.signals.arrays import Real
+from chladni import LevelLocation, Measurement, compare_levels, locate_from_levels
 
 LEVELS = (1, 3, 5, 7)
 FORCE = "/shaker.wrench.force.z"
@@ -115,7 +112,7 @@ def draw_outside(found: LevelLocation, axes) -> None:
     axes.grid(alpha=0.3)
 
 
-def spectrum(one: Measurement, signal: Real) -> tuple[Real, Real, Real]:
+def spectrum(one: Measurement, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """RMS a line of what repeats and of what doesn't, over some lines at a time."""
     samples = int(one.period_samples or signal.size)
     periods = signal[: signal.size // samples * samples].reshape(-1, samples)[one.transient_periods :]

@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 import chladni
-from chladni.apps.demo_log import make_demo_log
+from chladni import make_demo_log
 
 
 def main() -> None:

@@ -3,20 +3,14 @@
 One file holds all of it: the law, the record, and the call. Nothing has to be registered.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 import chladni
-from chladni.models.core.parameter import Parameter, Parameters
-from chladni.models.core.port import Port
-from chladni.models.effects.attaching import LawAtPort
-from chladni.models.effects.catalogue import CATALOGUE
-from chladni.models.effects.effect_kind import EffectKind, Values, Variant
-from chladni.models.excitations.multisine import Multisine
-from chladni.models.instruments.robot_arm import arm_model
-from chladni.viewers.gap_summary import summary
+from chladni import EFFECTS, EffectKind, LawAtPort, Multisine, Parameter, Parameters, Port, Variant, arm_model
 
 SECONDS, RATE_HZ, NOISE = 6.0, 1000.0, 0.01
 COEFFICIENT = 200.0
@@ -29,7 +23,7 @@ def cubic_drag(_d: float, s: float, _t: float, parameters: Any, _state: Any, _ra
     return float(parameters[0] * s * s * s)
 
 
-def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
+def _numbers(values: Mapping[str, float], _port: Port) -> tuple[float, ...]:
     return (values["coefficient"],)
 
 
@@ -72,9 +66,9 @@ def main() -> None:
     """Diagnose with and without the effect of one's own."""
     log = log_of_the_machine()
     for title, own in (("without it", ()), ("with cubic_drag", (CUBIC_DRAG,))):
-        found = chladni.diagnose_gap(arm_model(), log, own_effects=own, leave_out=CATALOGUE.keys() - WEIGHED)
+        found = chladni.diagnose_gap(arm_model(), log, own_effects=own, leave_out=EFFECTS.keys() - WEIGHED)
         print(f"{title}: {found.verdict}")
-        for sentence in summary(found):
+        for sentence in found.summary():
             print(f"  {sentence}")
     print(f"truth: cubic_drag of {COEFFICIENT:g} N s^3/m^3 at elbow")
 

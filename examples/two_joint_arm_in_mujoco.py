@@ -16,12 +16,7 @@ import mujoco
 import numpy as np
 
 import chladni
-from chladni.gap.diagnosis.of_simulator import diagnose_simulator, explained_simulator
-from chladni.gap.records.diagnosis import Diagnosis
-from chladni.gap.simulators.mujoco_simulator import MujocoSimulator, mujoco_simulator
-from chladni.models.excitations.multisine import Multisine
-from chladni.signals.arrays import Real
-from chladni.viewers.gap_summary import summary
+from chladni import Diagnosis, MujocoSimulator, Multisine, diagnose_simulator, explained_simulator, mujoco_simulator
 
 MODEL = """
 <mujoco model="two-joint arm">
@@ -59,14 +54,14 @@ DELAY_S = 0.006
 COULOMB, STATIC, STRIBECK_SPEED, BRISTLE_STIFFNESS, BRISTLE_DAMPING = 0.22, 0.30, 0.15, 400.0, 0.2
 
 
-def torques() -> Real:
+def torques() -> np.ndarray:
     """``[motor, sample]`` random multisines, four periods."""
     rng = np.random.default_rng(3)
     drives = [Multisine(rms=rms, period_s=2.0, band_hz=(0.5, 12.0)) for rms in (2.5, 0.8)]
     return np.array([drive.samples(round(SECONDS * RATE_HZ), RATE_HZ, rng) for drive in drives])
 
 
-def machine(commands: Real) -> tuple[Real, Real]:
+def machine(commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """``[output, sample]`` of the machine, and ``[2, sample]`` of speed and friction in its elbow."""
     model = mujoco.MjModel.from_xml_string(MODEL)
     model.opt.timestep /= 4
@@ -97,7 +92,7 @@ def lugre(bend: float, speed: float, step_s: float) -> tuple[float, float]:
     return after, BRISTLE_STIFFNESS * after + BRISTLE_DAMPING * (after - bend) / step_s
 
 
-def record(path: Path) -> Real:
+def record(path: Path) -> np.ndarray:
     """Write the machine's log; give speed and friction in its elbow, which the log doesn't hold."""
     commands = torques()
     outputs, elbow = machine(commands)
@@ -120,7 +115,7 @@ def arm() -> MujocoSimulator:
     )
 
 
-def draw(found: Diagnosis, elbow: Real, path: Path) -> None:
+def draw(found: Diagnosis, elbow: np.ndarray, path: Path) -> None:
     """Draw the tip's acceleration before and after, and the elbow's friction as it is and as it was found."""
     import matplotlib.pyplot as plt
 
@@ -156,7 +151,7 @@ def main() -> None:
         elbow = record(path)
         with chladni.open_log(path) as log:
             found = diagnose_simulator(arm(), log.read(), log=path.name)
-        for sentence in summary(found):
+        for sentence in found.summary():
             print(sentence)
         for cause in found.causes:
             for name, number in cause.parameters.items():

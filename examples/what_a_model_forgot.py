@@ -11,10 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import chladni
-from chladni.models.excitations.multisine import Multisine
-from chladni.models.instruments.robot_arm import arm_model
-from chladni.models.structures.structure_model import StructureModel
-from chladni.viewers.gap_summary import summary
+from chladni import Multisine, StructureModel, arm_model
 
 SECONDS, RATE_HZ, NOISE = 8.0, 1000.0, 0.01
 FRICTION_N = 8.0
@@ -58,7 +55,7 @@ def main() -> None:
         chladni.write_model(model, folder / "arm.toml")
         chladni.write_mcap(log, folder / "arm.mcap")
     found = chladni.diagnose_gap(model, log)
-    for sentence in summary(found):
+    for sentence in found.summary():
         print(sentence)
     print(f"truth: Coulomb friction of {FRICTION_N:g} N at elbow, every parameter off by some per cent")
 

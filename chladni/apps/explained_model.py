@@ -1,8 +1,10 @@
-"""A model with what a diagnosis found: tuned parameters, effects attached."""
+"""A model nearer to its machine: tuned to a log, or with what a diagnosis found."""
 
 from collections.abc import Sequence
 
+from chladni.gap.comparison.measuring import measurement_of
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Diagnosis
+from chladni.io.source import SeriesLike, log_or_series, series_of
 from chladni.models.core.model import Effect, Model
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.effect_kind import EffectKind
@@ -42,6 +44,43 @@ def explained_model(model: Model, found: Diagnosis, *, own_effects: Sequence[Eff
         if cause.effect != PARAMETER
     ]
     return model.with_values(values).with_effects((*model.effects, *added))
+
+
+def tuned_model(
+    model: Model,
+    source: SeriesLike,
+    *,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> Model:
+    """Give the model with the parameters that suit a log best when nothing is added to it.
+
+    Parameters
+    ----------
+    model
+        The one to tune, as far as its tolerances allow.
+    source, sample_rate_hz, start_s, end_s
+        The log, the path to one, a series, or arrays by their channel's name; see `chladni.psd`.
+
+    Raises
+    ------
+    LogError
+        When the log lacks a channel of an input, or holds no output.
+    """
+    # They compile what they simulate with, which a look at the façade shouldn't pay for.
+    from chladni.gap.comparison.quiet_floor import quiet_floor
+    from chladni.gap.plant.free_run import FreeRun
+    from chladni.gap.tuning.output_error import fit_output_error
+
+    log = log_or_series(source, sample_rate_hz=sample_rate_hz)
+    terminals = (*model.compile().inputs, *model.compile().outputs)
+    wanted = {name for one in terminals for name in (one.channel, one.name)}
+    listened = [channel.name for channel in log.channels if channel.name in wanted]
+    measured, _ = measurement_of(
+        model, series_of(log, channels=listened or None, start_s=start_s, end_s=end_s), log="log"
+    )
+    return model.with_values(fit_output_error(FreeRun(model, measured), quiet_floor(measured)).values)
 
 
 def _is_value(cause: Cause) -> bool:

@@ -64,6 +64,35 @@ def show(*items: Shown, save: Path | str | None = None) -> None:
         rerun.write_rrd(study, save)
 
 
+def write_report(item: Shown, path: Path | str) -> Path:
+    """Write what was found as one HTML file that needs nothing else.
+
+    Parameters
+    ----------
+    item
+        A diagnosis; or a study, a log or the path to one, which is analysed first, or any value.
+    path
+        File to write; one that exists is replaced.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    LogError
+        When the file can't be written, or the log can't be read.
+    """
+    if isinstance(item, Diagnosis):
+        from chladni.viewers.report.gap import write_gap_report
+
+        return write_gap_report(gap_evidence(item), path)
+    from chladni.viewers import report
+
+    return report.write_report(gather(item), path)
+
+
 def gather(*items: Shown) -> Study:
     """Put items into one study; later functions or modes replace earlier ones, with a finding that says so."""
     if not items:

@@ -8,15 +8,20 @@ from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.records.diagnosis import PARAMETER, Diagnosis
 from chladni.gap.simulators.simulator import Simulator
 from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
+from chladni.io.source import SeriesLike, series_of
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.effect_kind import EffectKind
-from chladni.signals.time_series import TimeSeries
+from chladni.signals.renamed import renamed
 
 
+@renamed(recording="source")
 def diagnose_simulator(
     simulator: Simulator,
-    recording: TimeSeries,
+    source: SeriesLike,
     *,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
     log: str = "log",
     own_effects: Sequence[EffectKind] = (),
     leave_out: Sequence[str] = (),
@@ -32,8 +37,12 @@ def diagnose_simulator(
     ----------
     simulator
         From `mujoco_simulator`, `callable_simulator`, or of your own.
-    recording
-        The log's channels on one grid, as `Log.read` gives them.
+    source
+        A log whose channels share one grid, the path to one, a series, or arrays by their channel's name.
+    sample_rate_hz
+        Samples a second of arrays, or of a file that doesn't say it.
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
     log
         Its name, for people.
     own_effects
@@ -59,6 +68,7 @@ def diagnose_simulator(
     EstimateError
         When the log is shorter than 3 s.
     """
+    recording = series_of(source, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     model = WrappedSimulator(simulator=simulator)
     measurement, remarks = measurement_of(model, recording, log=log)
     found = diagnose(

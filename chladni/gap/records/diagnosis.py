@@ -11,6 +11,7 @@ from chladni.gap.records.log_use import LogUse
 from chladni.gap.records.robot import JointMotion, TorqueMap
 from chladni.robots.machine import Machine
 from chladni.signals.arrays import Real
+from chladni.signals.outlets import outlet
 from chladni.signals.value import Drawn, Value, require_shape
 
 Verdict = Literal["none", "parameters", "effect", "unknown"]
@@ -448,6 +449,11 @@ class Diagnosis(Drawn):
     torque_maps: tuple[TorqueMap, ...] = ()
     answer_set: tuple[Candidate, ...] = ()
     coverage: float = COVERAGE
+
+    def summary(self) -> tuple[str, ...]:
+        """Say what was found, in sentences: the answer first, then how far it goes, and what limits it."""
+        sentences: tuple[str, ...] = outlet("summary")(self)
+        return sentences
 
     @property
     def restoring_force(self) -> RestoringForce | None:

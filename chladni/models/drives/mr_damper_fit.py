@@ -11,6 +11,7 @@ from chladni.models.drives.mr_record import MrRecord
 from chladni.models.integrator.known_motion import force_along_motion
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
+from chladni.signals.renamed import renamed
 
 # Where a trial's force grows beyond all numbers it counts as this many times the measured RMS.
 _BEYOND = 1e3
@@ -66,6 +67,7 @@ class MrFit:
     notes: tuple[str, ...]
 
 
+@renamed(rate_hz="sample_rate_hz")
 def fit_mr_damper(
     records: Sequence[MrRecord],
     *,
@@ -74,7 +76,7 @@ def fit_mr_damper(
     lowest_k1: float | None = 0.0,
     starts: int = 3,
     seed: int = 0,
-    rate_hz: float = 100.0,
+    sample_rate_hz: float = 100.0,
     origin: str = "",
 ) -> MrFit:
     """Fit the modified Bouc-Wen law (equation 5) to measured strokes, all at once.
@@ -100,7 +102,7 @@ def fit_mr_damper(
         How many starts; the first is a rule of thumb, the others scatter around it.
     seed
         Of that scatter.
-    rate_hz
+    sample_rate_hz
         Samples a second, at least, that the fit looks at; the errors told are of all samples.
     origin
         Kept with the coefficients.
@@ -113,7 +115,7 @@ def fit_mr_damper(
     order = _order(records, order)
     layout = layout_of(records, order=order, asymmetry=asymmetry, lowest_k1=lowest_k1)
     # The law is slow beside the rate of a log: half the samples tell as much in half the time.
-    thinned = [record.thinned(rate_hz) for record in records]
+    thinned = [record.thinned(sample_rate_hz) for record in records]
     found = [_from_start(layout, thinned, start) for start in _starts(layout, thinned, starts, seed)]
     # The lowest of several: nothing says that least squares of a hysteresis has one minimum.
     best = min(found, key=lambda each: each[1])[0]

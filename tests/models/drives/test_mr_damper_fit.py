@@ -197,5 +197,5 @@ def test_fitted_on_two_currents_the_third_and_another_stroke_are_predicted(share
 
 @pytest.mark.nightly
 def test_the_extension_follows_a_log(shared_data):
-    fit = fit_mr_damper([measured(shared_data, "mr_0.5A")], asymmetry=True, starts=1, rate_hz=50.0)
+    fit = fit_mr_damper([measured(shared_data, "mr_0.5A")], asymmetry=True, starts=1, sample_rate_hz=50.0)
     assert 100 * fit.errors[0].of_rms_force < 4.6
