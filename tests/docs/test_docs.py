@@ -1,8 +1,10 @@
 """What the documents promise is there: links, commands, and the gate's own command."""
 
+import doctest
 import re
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pytest
 from typer.testing import CliRunner
 
@@ -49,6 +51,15 @@ def test_the_gate_runs_the_command_that_the_readme_gives():
         "python3 -m venv .venv && .venv/bin/pip install -e '.[dev]' && .venv/bin/python -m pytest",
     ]
     assert "README.md" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_the_page_of_arrays_runs_as_it_stands():
+    for extra in ("pandas", "xarray"):
+        pytest.importorskip(extra, reason=f"needs the extra [{extra}]")
+    found = doctest.testfile(str(ROOT / "docs" / "python.md"), module_relative=False)
+    plt.close("all")
+    assert found.attempted > 10
+    assert not found.failed
 
 
 def test_functions_that_the_guide_names_exist():
