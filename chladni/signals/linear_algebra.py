@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib import import_module
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 
 @contextmanager
@@ -15,7 +16,13 @@ def in_one_thread() -> Iterator[None]:
     done here are products of small matrices by the thousand: shared out over threads, they take longer to meet than
     to multiply.
     """
+    with _libraries().limit(limits=1):
+        yield
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """Find the libraries once: to look for them among all that is loaded takes longer than many a small problem."""
     # SciPy brings a second library of its own, which can't be limited before it's loaded.
     import_module("scipy.linalg")
-    with threadpool_limits(limits=1, user_api="blas"):
-        yield
+    return ThreadpoolController().select(user_api="blas")

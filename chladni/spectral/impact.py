@@ -2,6 +2,7 @@
 
 import numpy as np
 import scipy.fft
+from numpy.typing import NDArray
 
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
@@ -56,7 +57,7 @@ def is_impact_test(series: TimeSeries, channel: str) -> bool:
     """
     alone = series.select([channel])
     measured = np.isfinite(alone.values) if alone.valid is None else alone.valid & np.isfinite(alone.values)
-    if not measured.any():
+    if not measured.any() or not _may_be_one_sided(alone.values[measured]):
         return False
     # Without a level: the question is whether the channel has pulses of its own accord.
     pulses = find_pulses(alone, channel, level=None)
@@ -70,6 +71,18 @@ def is_impact_test(series: TimeSeries, channel: str) -> bool:
     one_sided = -pulses.force.min() < heights.max() / 3
     silent = typical > 50 * pulses.noise and lasting < 0.05
     return bool(silent and one_sided and wide_enough and width_s <= LONGEST_PULSE_S)
+
+
+def _may_be_one_sided(samples: NDArray[np.floating]) -> bool:
+    """Whether the swing to one side of the median may be below a third of that to the other side.
+
+    The median then lies in an outer quarter of the range, which takes a count to see and no sorting.
+    """
+    low, high = float(samples.min()), float(samples.max())
+    quarter = (high - low) / 4
+    least = samples.size // 2
+    # Exactly half on either side: the median is anywhere between the two in the middle.
+    return max(np.count_nonzero(samples <= low + quarter), np.count_nonzero(samples >= high - quarter)) >= least
 
 
 def find_impacts(
