@@ -69,7 +69,7 @@ SYNONYMS = {
 }  # fmt: skip
 # Singular on purpose: the one point that all phases or ratios refer to, and the one value that is written.
 MEANT = {
-    "reference": {"deflection_shape", "phase_referenced_shape", "partial_coherence", "transmissibility"},
+    "reference": {"deflection_shape", "phase_referenced_shape", "transmissibility"},
     "response": {"write_uff_modes"},
 }  # fmt: skip
 
@@ -119,6 +119,8 @@ def test_the_table_of_arguments_is_that_of_the_signatures() -> None:
         ("find_peaks", "density", "source"),
         ("find_response_peaks", "response", "source"),
         ("analyse", "log", "source"),
+        ("partial_coherence", "reference", "references"),
+        ("amplitude_spectrum", "spectra", "source"),
         ("diagnose_simulator", "recording", "source"),
     ],
 )

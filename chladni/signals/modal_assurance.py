@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
 from chladni.signals.arrays import Real
@@ -11,7 +12,7 @@ from chladni.signals.value import Coordinate, Value, require_shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ModalAssurance(Value):
+class ModalAssurance(NDArrayOperatorsMixin, Value):
     """Modal assurance criterion between two sets of modes; a plain matrix to NumPy, since it has no unit.
 
     Attributes
@@ -37,8 +38,17 @@ class ModalAssurance(Value):
         """Give the numbers of the modes of a set, from 1 on."""
         return np.arange(1, (self.a_hz if axis == "mode_a" else self.b_hz).size + 1)
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:  # type: ignore[override]
+    def __array__(self, dtype: Any = None, copy: Any = None) -> NDArray[Any]:
         return np.array(self.values, dtype=dtype, copy=copy)
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        plain = (one.values if isinstance(one, ModalAssurance) else one for one in inputs)
+        return getattr(ufunc, method)(*plain, **options)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Modes of a, and of b."""
+        return self.a_hz.size, self.b_hz.size
 
     def __getitem__(self, place: Any) -> Any:
         return self.values[place]

@@ -4,7 +4,7 @@ import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -77,7 +77,7 @@ class Value(Drawn):
     """
 
     __slots__ = ()
-    __array_ufunc__ = None
+    __array_ufunc__: Any = None
     AXES: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     ROWS: ClassVar[str] = ""
 
@@ -130,7 +130,7 @@ class Value(Drawn):
         """
         outlet("to_csv")(self, path)
 
-    def __array__(self, dtype: object = None, copy: object = None) -> NoReturn:
+    def __array__(self, dtype: object = None, copy: object = None) -> Any:
         raise TypeError(
             f"{type(self).__name__} carries units that an array would lose; use its fields, such as .values"
         )

@@ -1,17 +1,21 @@
 """Amplitude spectra from averaged cross-spectra."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
+from chladni.io.source import Blocks, SeriesLike
 from chladni.signals.arrays import Real
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, Names
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import SetupError
 from chladni.signals.provenance import Provenance
+from chladni.signals.renamed import renamed
 from chladni.signals.value import Value, require_frequency_axis, require_shape
+from chladni.spectral.cross_spectra import spectra_of
 from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.windows import Window
 
 Quantity = Literal["rms", "peak"]
 QUANTITIES = ("rms", "peak")
@@ -38,6 +42,9 @@ class AmplitudeSpectrum(Value):
         How it was made.
     """
 
+    AXES: ClassVar = {"values": ("channels", "frequency_hz"), "std": ("channels", "frequency_hz")}
+    ROWS: ClassVar = "frequency_hz"
+
     frequency_hz: Real
     values: Real
     std: Real
@@ -52,19 +59,38 @@ class AmplitudeSpectrum(Value):
         require_shape("std", self.std, expected, "channels x frequencies")
         self._freeze()
 
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a channel."""
+        return self.channels[place[0]].unit
 
-def amplitude_spectrum(spectra: CrossSpectra, *, quantity: Quantity = "rms") -> AmplitudeSpectrum:
+
+@renamed(spectra="source")
+def amplitude_spectrum(
+    source: CrossSpectra | SeriesLike | Blocks,
+    *,
+    quantity: Quantity = "rms",
+    channels: Names | None = None,
+    resolution_hz: float | None = None,
+    window: Window = "hann",
+    overlap: float = 0.5,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> AmplitudeSpectrum:
     """Give the amplitude that a sine on each line would have.
 
     Right for tones; what noise reads depends on the noise bandwidth, so compare noise by its density.
 
     Parameters
     ----------
-    spectra
-        Averaged cross-spectra. A flat-top window keeps a tone between two lines within 0.2 %; Hann reads it up to
+    source
+        Averaged cross-spectra; or a log, the path to one, a series or an array ``[channel, sample]``, which is
+        averaged after Welch first. A flat-top window keeps a tone between two lines within 0.2 %; Hann reads it up to
         15 % low.
     quantity
         ``rms``, sqrt(G B) with the noise bandwidth B of a line; ``peak``, sqrt(2) of it except at 0 Hz.
+    channels, resolution_hz, window, overlap, sample_rate_hz, start_s, end_s
+        Of samples: how they are averaged, see `cross_spectra`.
 
     Returns
     -------
@@ -79,17 +105,23 @@ def amplitude_spectrum(spectra: CrossSpectra, *, quantity: Quantity = "rms") -> 
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
-    >>> from chladni.signals.time_series import TimeSeries
-    >>> from chladni.spectral.cross_spectra import cross_spectra
     >>> sine = 3.0 * np.sin(2 * np.pi * 25 * np.arange(4000) / 1000)
-    >>> series = TimeSeries(values=sine[np.newaxis], sample_rate_hz=1e3, channels=(Channel(name="a", unit="m/s^2"),))
-    >>> spectrum = amplitude_spectrum(cross_spectra(series, resolution_hz=1.0), quantity="peak")
+    >>> spectrum = amplitude_spectrum(sine, sample_rate_hz=1000.0, resolution_hz=1.0, quantity="peak")
     >>> float(spectrum.values[0, 25].round(9))
     3.0
     """
     if quantity not in QUANTITIES:
         raise SetupError(f"quantity {quantity!r} is none of {', '.join(QUANTITIES)}")
+    spectra = spectra_of(
+        source,
+        channels=channels,
+        resolution_hz=resolution_hz,
+        window=window,
+        overlap=overlap,
+        sample_rate_hz=sample_rate_hz,
+        start_s=start_s,
+        end_s=end_s,
+    )
     density = power_spectral_density(spectra)
     power = density.values * spectra.bandwidth_hz
     power_std = density.std * spectra.bandwidth_hz

@@ -1,7 +1,5 @@
 """Ordinary, multiple and partial coherence."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from chladni.io.source import Blocks, SeriesLike
@@ -9,8 +7,9 @@ from chladni.signals.arrays import Real
 from chladni.signals.channel import Names, as_names
 from chladni.signals.coherence import Coherence
 from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.renamed import renamed
 from chladni.spectral.channel_choice import choose_channels
-from chladni.spectral.cross_spectra import cross_spectra
+from chladni.spectral.cross_spectra import spectra_of
 from chladni.spectral.line_algebra import conditioned_density, solve_lines
 from chladni.spectral.power_spectral_density import auto_densities
 from chladni.spectral.uncertainty import coherence_std
@@ -64,20 +63,16 @@ def coherence(
     >>> float(found.values.mean().round(1))
     0.5
     """
-    if isinstance(source, CrossSpectra):
-        spectra = source
-    else:
-        named = None if responses is None else dict.fromkeys((*as_names(references), *as_names(responses)))
-        spectra = cross_spectra(
-            source,
-            channels=named,
-            resolution_hz=resolution_hz,
-            window=window,
-            overlap=overlap,
-            sample_rate_hz=sample_rate_hz,
-            start_s=start_s,
-            end_s=end_s,
-        )
+    spectra = spectra_of(
+        source,
+        channels=None if responses is None else (*as_names(references), *as_names(responses)),
+        resolution_hz=resolution_hz,
+        window=window,
+        overlap=overlap,
+        sample_rate_hz=sample_rate_hz,
+        start_s=start_s,
+        end_s=end_s,
+    )
     chosen = choose_channels(spectra, references, responses)
     density = np.asarray(spectra.density, dtype=np.complex128)
     # One formula for both kinds: with one reference the explained power is |G_xy|^2/G_xx.
@@ -95,12 +90,19 @@ def coherence(
     )
 
 
+@renamed(reference="references")
 def partial_coherence(
-    spectra: CrossSpectra,
+    source: CrossSpectra | SeriesLike | Blocks,
     *,
-    reference: str,
-    conditioned_on: str | Sequence[str],
-    responses: str | Sequence[str] | None = None,
+    references: str,
+    conditioned_on: Names,
+    responses: Names | None = None,
+    resolution_hz: float | None = None,
+    window: Window = "hann",
+    overlap: float = 0.5,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> Coherence:
     """Give the coherence of one reference with each response after others have been taken out of both.
 
@@ -109,14 +111,16 @@ def partial_coherence(
 
     Parameters
     ----------
-    spectra
-        Averaged cross-spectra.
-    reference
+    source
+        As for `coherence`.
+    references
         Name of the excitation that is judged.
     conditioned_on
         Names of the channels whose contribution is removed first.
     responses
         Names of the responses; None takes all other channels.
+    resolution_hz, window, overlap, sample_rate_hz, start_s, end_s
+        Of samples: how they are averaged, see `cross_spectra`.
 
     Returns
     -------
@@ -129,7 +133,17 @@ def partial_coherence(
     EstimateError
         When a channel is missing or named twice, or the spectra are peak-held.
     """
-    names = (reference, *([conditioned_on] if isinstance(conditioned_on, str) else conditioned_on))
+    names = (references, *as_names(conditioned_on))
+    spectra = spectra_of(
+        source,
+        channels=None if responses is None else (*names, *as_names(responses)),
+        resolution_hz=resolution_hz,
+        window=window,
+        overlap=overlap,
+        sample_rate_hz=sample_rate_hz,
+        start_s=start_s,
+        end_s=end_s,
+    )
     chosen = choose_channels(spectra, names, responses)
     kept, removed = [chosen.references[0], *chosen.responses], chosen.references[1:]
     density = np.asarray(spectra.density, dtype=np.complex128)

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 from chladni.io.source import Blocks, SeriesLike, blocks_of
-from chladni.signals.channel import Channel, Names
+from chladni.signals.channel import Channel, Names, as_names
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.linear_algebra import in_one_thread
 from chladni.spectral.accumulator import (
@@ -86,6 +87,18 @@ def cross_spectra(
         window=window,
         overlap=overlap,
         detrend=detrend,
+    )
+
+
+def spectra_of(
+    source: CrossSpectra | SeriesLike | Blocks, *, channels: Names | None = None, **averaging: Any
+) -> CrossSpectra:
+    """Give cross-spectra as they are, and average those of all else a caller has; options as for `cross_spectra`."""
+    if isinstance(source, CrossSpectra):
+        return source
+    # Each once: a response may be a reference, too.
+    return cross_spectra(
+        source, channels=None if channels is None else dict.fromkeys(as_names(channels)), **averaging
     )
 
 

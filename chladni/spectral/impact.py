@@ -82,7 +82,8 @@ def _may_be_one_sided(samples: NDArray[np.floating]) -> bool:
     quarter = (high - low) / 4
     least = samples.size // 2
     # Exactly half on either side: the median is anywhere between the two in the middle.
-    return max(np.count_nonzero(samples <= low + quarter), np.count_nonzero(samples >= high - quarter)) >= least
+    low_side, high_side = np.count_nonzero(samples <= low + quarter), np.count_nonzero(samples >= high - quarter)
+    return bool(low_side >= least or high_side >= least)
 
 
 def find_impacts(

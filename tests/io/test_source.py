@@ -16,6 +16,7 @@ VERBS = {
     "psd": chladni.psd,
     "cross_spectra": chladni.cross_spectra,
     "waterfall": chladni.waterfall,
+    "amplitude_spectrum": chladni.amplitude_spectrum,
     "coherence": partial(chladni.coherence, references="x"),
     "frf": partial(chladni.frf, references="x"),
     "identify_modes": partial(chladni.identify_modes, references="x"),

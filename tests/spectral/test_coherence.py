@@ -68,7 +68,7 @@ def test_multiple_coherence_explains_what_both_bring():
 
 def test_partial_coherence_takes_the_other_reference_out():
     spectra = two_sources()
-    result = partial_coherence(spectra, reference="b", conditioned_on=["a"])
+    result = partial_coherence(spectra, references="b", conditioned_on=["a"])
     assert result.kind == "partial"
     assert [channel.name for channel in result.conditioned_on] == ["a"]
     assert [channel.name for channel in result.responses] == ["c", "d", "e"]
@@ -85,7 +85,7 @@ def test_ordinary_coherence_is_fooled_where_partial_is_not():
 def test_what_is_conditioned_on_leaves_nothing_of_itself():
     a, b, n = noise(3, SAMPLES)
     spectra = spectra_of([a, b, 5 * a, n])
-    result = partial_coherence(spectra, reference="b", conditioned_on="a")
+    result = partial_coherence(spectra, references="b", conditioned_on="a")
     assert not result.values[0].any()
 
 
@@ -94,7 +94,7 @@ def test_dead_channels_are_not_coherent():
     spectra = spectra_of([x[0], np.zeros(5000), x[1]])
     assert not coherence(spectra, references="a", responses=["b"]).values.any()
     assert not coherence(spectra, references="b").values.any()
-    assert not partial_coherence(spectra, reference="b", conditioned_on="a").values.any()
+    assert not partial_coherence(spectra, references="b", conditioned_on="a").values.any()
 
 
 def test_a_share_stays_between_nothing_and_all():
@@ -105,4 +105,4 @@ def test_a_share_stays_between_nothing_and_all():
 
 def test_a_channel_named_twice_is_refused():
     with pytest.raises(EstimateError, match="named twice"):
-        partial_coherence(two_sources(), reference="a", conditioned_on=["a"])
+        partial_coherence(two_sources(), references="a", conditioned_on=["a"])

@@ -151,3 +151,11 @@ def test_shapes_by_columns_against_rows_of_a_square_set_are_refused_until_told()
 def test_shapes_over_other_channels_are_refused():
     with pytest.raises(EstimateError, match="no channels in common"):
         mac(np.ones((2, 5)), np.ones((4, 3)))
+
+
+def test_a_mac_is_a_plain_matrix_to_numpy():
+    found = mac(np.eye(3), rows="modes")
+    assert found.shape == (3, 3)
+    assert ((found > 0.5) == np.eye(3, dtype=bool)).all()
+    np.testing.assert_array_equal(1 - found, 1 - np.eye(3))
+    assert np.trace(found) == 3.0
