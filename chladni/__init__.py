@@ -45,6 +45,7 @@ _HOME = {
     "MujocoSimulator": "chladni.gap.simulators.mujoco_simulator",
     "mujoco_simulator": "chladni.gap.simulators.mujoco_simulator",
     "read_uff_modes": "chladni.io.files.uff_modes",
+    "write_uff": "chladni.io.files.uff_modes",
     "write_uff_modes": "chladni.io.files.uff_modes",
     "Log": "chladni.io.log",
     "open": "chladni.io.log",
@@ -300,6 +301,7 @@ __all__ = [
     "write_model",
     "write_report",
     "write_trajectory",
+    "write_uff",
     "write_uff_modes",
 ]
 
@@ -330,7 +332,7 @@ if TYPE_CHECKING:
     from chladni.gap.records.measurement import Measurement
     from chladni.gap.simulators.callable_simulator import callable_simulator
     from chladni.gap.simulators.mujoco_simulator import MujocoSimulator, mujoco_simulator
-    from chladni.io.files.uff_modes import read_uff_modes, write_uff_modes
+    from chladni.io.files.uff_modes import read_uff_modes, write_uff, write_uff_modes
     from chladni.io.log import Log, open, open_log  # noqa: A004  # as chladni.open
     from chladni.io.mcap.writer import write_mcap
     from chladni.io.setup import load_setup

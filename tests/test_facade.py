@@ -30,7 +30,8 @@ SURFACE = {
     "phase_referenced_shape", "place_damper", "plot", "psd", "read_uff_modes", "relative_motion", "robot_arm",
     "roving_hammer", "save_figures", "shape_transmissibility", "show", "simulate", "third_octave_levels",
     "transmissibility", "transmissibility_along", "treatments", "tuned_model", "unit_modal_mass_shapes",
-    "validate", "waterfall", "write_mcap", "write_model", "write_report", "write_trajectory", "write_uff_modes",
+    "validate", "waterfall", "write_mcap", "write_model", "write_report", "write_trajectory", "write_uff",
+    "write_uff_modes",
 }  # fmt: skip
 ARGUMENTS = Path(__file__).parents[1] / "docs" / "arguments.md"
 HEAD = (

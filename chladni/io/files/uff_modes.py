@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from chladni.io.atomic import atomic_path
+from chladni.io.files.uff import write_uff as write_records
 from chladni.io.files.uff_functions import NodeDirection, function_datasets, is_read, read_functions
 from chladni.io.files.uff_header import direction_code
 from chladni.io.files.uff_mode_set import mode_set_of
@@ -30,6 +31,7 @@ from chladni.signals.errors import LogError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry
 from chladni.signals.mode_set import ModeSet
+from chladni.signals.time_series import TimeSeries
 from chladni.signals.value import Value
 from chladni.signals.wording import counted
 
@@ -58,9 +60,64 @@ class UffModes(Value):
     notes: tuple[str, ...]
 
 
+def write_uff(
+    values: TimeSeries | FrequencyResponse | ModeSet | Sequence[TimeSeries | FrequencyResponse | ModeSet],
+    path: Path | str,
+    *,
+    geometry: Geometry | None = None,
+    binary: bool = True,
+    overwrite: bool = True,
+) -> tuple[str, ...]:
+    """Write series, frequency responses or modes to a universal file; `chladni.open` reads all of them.
+
+    Parameters
+    ----------
+    values
+        Series; or frequency responses, modes, or both. A file holds records over time or the results of a test.
+    path
+        File to write.
+    geometry
+        Points and lines of the modes.
+    binary
+        Whether numbers are written as 58b, which is exact; 58 is text with twelve digits.
+
+    Returns
+    -------
+    losses
+        Sentences on what the file doesn't hold.
+
+    Raises
+    ------
+    LogError
+        When the file can't be written, for gaps, or for values that don't go into one file.
+
+    Examples
+    --------
+    >>> losses = write_uff([response, modes], "test.uff")  # doctest: +SKIP
+    """
+    parts = (values,) if isinstance(values, Value) else tuple(values)
+    series = [one for one in parts if isinstance(one, TimeSeries)]
+    responses = [one for one in parts if isinstance(one, FrequencyResponse)]
+    modes = [one for one in parts if isinstance(one, ModeSet)]
+    if not parts or (series and len(series) < len(parts)) or len(responses) > 1 or len(modes) > 1:
+        raise LogError(
+            "a universal file holds series, or one set of frequency responses and one of modes; write a file for each"
+        )
+    if series:
+        return write_records(series, path, binary=binary, overwrite=overwrite)
+    return write_uff_modes(
+        path,
+        modes[0] if modes else None,
+        geometry=geometry or Geometry(),
+        response=responses[0] if responses else None,
+        binary=binary,
+        overwrite=overwrite,
+    )
+
+
 def write_uff_modes(
     path: Path | str,
-    modes: ModeSet,
+    modes: ModeSet | None,
     *,
     geometry: Geometry,
     response: FrequencyResponse | None = None,
@@ -75,6 +132,8 @@ def write_uff_modes(
 
     Parameters
     ----------
+    modes
+        None writes functions alone.
     response
         Functions that the modes came from, in SI.
     binary
@@ -97,10 +156,12 @@ def write_uff_modes(
     unplaced = [name for name in dict.fromkeys(points.values()) if name not in known]
     places = {one.name: _place(one, nodes[points[one.name]]) for one in everything}
     node_text, losses = node_blocks(geometry, nodes, unplaced)
-    motions, moved = _motions(modes, places)
-    losses += moved + _losses(modes, everything, places)
-    unit = _common_unit(modes.channels)
-    shapes = shape_blocks(modes, motions, unit=unit, driving=_driving(modes, places))
+    shapes = ""
+    if modes is not None:
+        motions, moved = _motions(modes, places)
+        losses += moved + _losses(modes, everything, places)
+        unit = _common_unit(modes.channels)
+        shapes = shape_blocks(modes, motions, unit=unit, driving=_driving(modes, places))
     functions, lost = ([], ()) if response is None else function_datasets(response, places, binary=binary)
     with atomic_path(path, overwrite=overwrite) as temporary:
         temporary.write_text(_header_text(), encoding="ascii", newline="\n")
@@ -184,10 +245,11 @@ def _doubts(path: Path, headers: Sequence[Dataset]) -> tuple[str, ...]:
     )
 
 
-def _channels_of(modes: ModeSet, response: FrequencyResponse | None) -> tuple[Channel, ...]:
+def _channels_of(modes: ModeSet | None, response: FrequencyResponse | None) -> tuple[Channel, ...]:
     others = () if response is None else (*response.responses, *response.references)
     # The channels of the modes go last, so that they stand for their name.
-    by_name = {channel.name: channel for channel in (*others, *modes.references, *modes.channels)}
+    last = () if modes is None else (*modes.references, *modes.channels)
+    by_name = {channel.name: channel for channel in (*others, *last)}
     return tuple(by_name.values())
 
 

@@ -178,3 +178,30 @@ def test_a_file_of_modes_gives_its_modes(tmp_path: Path) -> None:
         assert chladni.identify_modes(log).frequency_hz == pytest.approx(scaled_modes().frequency_hz, rel=1e-5)
         with pytest.raises(LogError, match=r"modes, but no samples over time; chladni modes a\.uff"):
             chladni.frf(log)
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_values_go_out_and_come_back_by_one_verb_each(tmp_path, binary):
+    rtol = 0 if binary else 1e-11
+    response = chladni.FrequencyResponse.from_arrays(
+        np.arange(1.0, 5.0), np.arange(8.0).reshape(2, 1, 4) * (1 + 2j), responses=["a", "b"], references="f",
+        response_units="m/s^2", reference_units="N",
+    )  # fmt: skip
+    modes = chladni.ModeSet.from_arrays([2.0, 3.0], [[1.0, 0.5], [0.25, 1.0]], damping_ratio=0.01, rows="modes")
+    chladni.write_uff([response, modes], tmp_path / "both.uff", binary=binary)
+    chladni.write_uff(response, tmp_path / "functions.uff", binary=binary)
+    for name in ("both.uff", "functions.uff"):
+        with chladni.open(tmp_path / name) as log:
+            back = chladni.frf(log)
+            found = log.modes
+        np.testing.assert_allclose(back.values, response.values, rtol=rtol)
+        assert [channel.unit for channel in back.responses] == ["m/s^2", "m/s^2"]
+        assert (found is None) == (name == "functions.uff")
+        if found is not None:
+            np.testing.assert_allclose(found.frequency_hz, modes.frequency_hz, rtol=1e-15)
+            np.testing.assert_allclose(chladni.mac(found.shapes, modes.shapes, rows="modes").values.diagonal(), 1.0)
+    series = chladni.TimeSeries.from_arrays([1.0, 2.0, 3.0], sample_rate_hz=10.0)
+    chladni.write_uff(series, tmp_path / "series.uff", binary=binary)
+    assert chladni.open(tmp_path / "series.uff").read().values.tolist() == [[1.0, 2.0, 3.0]]
+    with pytest.raises(chladni.LogError, match="write a file for each"):
+        chladni.write_uff([series, modes], tmp_path / "none.uff")
