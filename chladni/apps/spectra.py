@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chladni.apps.excitation import excitation_names, stored_functions
 from chladni.apps.sources import Progress, Span, Watched, no_progress, on_one_grid, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
-from chladni.io.source import SeriesLike, log_or_series
+from chladni.io.source import SeriesLike, are_numbers, driven_series, log_or_series
 from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError
@@ -163,7 +164,7 @@ def densities(
 def frf(
     source: SeriesLike,
     *,
-    references: Names | None = None,
+    references: Names | ArrayLike | None = None,
     responses: Names | None = None,
     estimator: Estimator = "H1",
     resolution_hz: float | None = None,
@@ -186,6 +187,7 @@ def frf(
         A log (read block by block when it's large), the path to one, a series, or an array ``[channel, sample]``.
     references
         Message path of the excitation, or several; None takes those whose role is reference, else the first force.
+        Beside an array the samples of the excitation may be given, ``[sample]`` or ``[channel, sample]``.
     responses
         Message paths of the responses; None for all other channels that share the reference's sampling grid and
         change at all.
@@ -216,12 +218,19 @@ def frf(
     >>> response = frf({"f": force, "a": 0.5 * force}, sample_rate_hz=100.0, references="f", resolution_hz=1.0)
     >>> float(abs(response.values[0, 0, 10]).round(12))
     0.5
+    >>> same = frf(0.5 * force, references=force, sample_rate_hz=100.0, resolution_hz=1.0)
+    >>> bool(np.array_equal(same.values, response.values))
+    True
     """
-    source = log_or_series(source, sample_rate_hz=sample_rate_hz)
+    named: Names | None
+    if references is not None and are_numbers(references):
+        source, named = driven_series(source, cast("ArrayLike", references), sample_rate_hz=sample_rate_hz)
+    else:
+        source, named = log_or_series(source, sample_rate_hz=sample_rate_hz), cast("Names | None", references)
     averaging = Averaging(resolution_hz=resolution_hz, window=window, overlap=overlap)
     return transfer(
         source,
-        None if references is None else as_names(references),
+        None if named is None else as_names(named),
         None if responses is None else as_names(responses),
         estimator=estimator,
         averaging=averaging,

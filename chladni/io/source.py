@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from chladni.io.log import Log
 from chladni.io.log import open as open_log
-from chladni.signals.channel import Names, as_names
-from chladni.signals.errors import SetupError
+from chladni.signals.channel import Names, as_names, numbered
+from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.time_series import Arrays, TimeSeries
@@ -74,6 +74,49 @@ def log_or_series(source: SeriesLike, *, sample_rate_hz: float | None = None) ->
     if sample_rate_hz is None:
         raise SetupError("an array doesn't tell its sample rate; give sample_rate_hz=")
     return TimeSeries.from_arrays(source, sample_rate_hz=sample_rate_hz)
+
+
+def driven_series(
+    responses: SeriesLike, references: ArrayLike, *, sample_rate_hz: float | None
+) -> tuple[TimeSeries, tuple[str, ...]]:
+    """Give arrays of responses and of what excites them as one series, and the names of the references.
+
+    Raises
+    ------
+    SetupError
+        When the responses aren't an array, or come without their rate.
+    EstimateError
+        When the two aren't equally long.
+
+    Examples
+    --------
+    >>> series, names = driven_series(np.ones((2, 8)), np.zeros(8), sample_rate_hz=1.0)
+    >>> [channel.name for channel in series.channels], names
+    (['reference1', 'ch1', 'ch2'], ('reference1',))
+    """
+    if isinstance(responses, Log | Value | str | os.PathLike):
+        raise SetupError("references are an array; name its channel, or give the responses as an array, too")
+    if sample_rate_hz is None:
+        raise SetupError("an array doesn't tell its sample rate; give sample_rate_hz=")
+    moved = TimeSeries.from_arrays(responses, sample_rate_hz=sample_rate_hz)
+    driven = np.atleast_2d(np.asarray(references))
+    names = numbered("reference", len(driven))
+    drives = TimeSeries.from_arrays(driven, sample_rate_hz=sample_rate_hz, names=names, references=names)
+    if drives.samples != moved.samples:
+        raise EstimateError(f"references have {drives.samples} samples, responses {moved.samples}; cut them alike")
+    together = TimeSeries.from_arrays(
+        np.vstack([drives.values, moved.values]),
+        sample_rate_hz=sample_rate_hz,
+        names=[channel.name for one in (drives, moved) for channel in one.channels],
+        references=names,
+    )
+    return together, names
+
+
+def are_numbers(given: object) -> bool:
+    """Whether an argument is an array of numbers, and no names."""
+    numbers = np.asarray(() if isinstance(given, str) else given)
+    return bool(numbers.size) and numbers.dtype.kind in "fiu"
 
 
 def series_of(

@@ -124,3 +124,15 @@ def test_a_string_means_one_channel(path):
         assert_close(log.read("y"), log.read(["y"]), rtol=0)
         assert_close(chladni.psd(log, channels="y"), chladni.psd(log, channels=["y"]), rtol=0)
     assert series().select("y").channels == series().channels[1:]
+
+
+def test_responses_and_references_may_be_two_arrays():
+    given = arrays()
+    expected = chladni.frf(series(), references="x", resolution_hz=1.0)
+    found = chladni.frf(given["y"], references=given["x"], sample_rate_hz=RATE_HZ, resolution_hz=1.0)
+    np.testing.assert_array_equal(found.values, expected.values)
+    assert [channel.name for channel in (*found.references, *found.responses)] == ["reference1", "ch1"]
+    with pytest.raises(chladni.SetupError, match="name its channel"):
+        chladni.frf(series(), references=given["x"])
+    with pytest.raises(chladni.EstimateError, match="references have 8191 samples, responses 8192"):
+        chladni.frf(given["y"], references=given["x"][1:], sample_rate_hz=RATE_HZ)
