@@ -119,9 +119,13 @@ _HOME = {
     "joint_log": "chladni.robots.joint_log",
     "load_robot": "chladni.robots.loading",
     "write_trajectory": "chladni.robots.trajectory",
+    "Cepstrum": "chladni.signals.cepstrum",
     "Channel": "chladni.signals.channel",
     "Coherence": "chladni.signals.coherence",
     "CrossSpectra": "chladni.signals.cross_spectra",
+    "Bearing": "chladni.signals.envelope",
+    "EnvelopeSpectrum": "chladni.signals.envelope",
+    "Kurtogram": "chladni.signals.envelope",
     "ChladniError": "chladni.signals.errors",
     "EstimateError": "chladni.signals.errors",
     "LogError": "chladni.signals.errors",
@@ -129,6 +133,9 @@ _HOME = {
     "SetupError": "chladni.signals.errors",
     "FrequencyResponse": "chladni.signals.frequency_response",
     "Geometry": "chladni.signals.geometry",
+    "Levels": "chladni.signals.levels",
+    "OctaveLevels": "chladni.signals.levels",
+    "Severity": "chladni.signals.levels",
     "ModalAssurance": "chladni.signals.modal_assurance",
     "ModeSet": "chladni.signals.mode_set",
     "Peak": "chladni.signals.peak",
@@ -141,11 +148,13 @@ _HOME = {
     "CrossSpectraAccumulator": "chladni.spectral.accumulator",
     "AmplitudeSpectrum": "chladni.spectral.amplitude_spectrum",
     "amplitude_spectrum": "chladni.spectral.amplitude_spectrum",
-    "BandLevels": "chladni.spectral.bands",
+    "BandLevels": "chladni.signals.levels",
     "band_rms": "chladni.spectral.bands",
+    "cepstrum": "chladni.spectral.cepstrum",
     "coherence": "chladni.spectral.coherence",
     "partial_coherence": "chladni.spectral.coherence",
     "cross_spectra": "chladni.spectral.cross_spectra",
+    "envelope": "chladni.spectral.envelope",
     "convert_form": "chladni.spectral.forms",
     "find_impacts": "chladni.spectral.impact",
     "impact_cross_spectra": "chladni.spectral.impact",
@@ -153,9 +162,12 @@ _HOME = {
     "differentiate_density": "chladni.spectral.integration",
     "integrate": "chladni.spectral.integration",
     "integrate_density": "chladni.spectral.integration",
+    "kurtogram": "chladni.spectral.kurtogram",
+    "levels": "chladni.spectral.levels",
+    "octaves": "chladni.spectral.octaves",
     "find_peaks": "chladni.spectral.peaks",
     "find_response_peaks": "chladni.spectral.peaks",
-    "third_octave_levels": "chladni.spectral.third_octave",
+    "severity": "chladni.spectral.severity",
     "transmissibility": "chladni.spectral.transmissibility",
     "transmissibility_along": "chladni.spectral.transmissibility",
     "waterfall": "chladni.spectral.waterfall",
@@ -171,7 +183,9 @@ __all__ = [
     "Album",
     "AmplitudeSpectrum",
     "BandLevels",
+    "Bearing",
     "Block",
+    "Cepstrum",
     "Channel",
     "ChladniError",
     "CircleFit",
@@ -185,14 +199,17 @@ __all__ = [
     "Diagnosis",
     "EffectKind",
     "EnhancedFrequencyDomainDecomposition",
+    "EnvelopeSpectrum",
     "EstimateError",
     "FrequencyDomainDecomposition",
     "FrequencyResponse",
     "Geometry",
     "HalfPower",
     "InfluenceTable",
+    "Kurtogram",
     "LawAtPort",
     "LevelLocation",
+    "Levels",
     "Log",
     "LogError",
     "Measurement",
@@ -202,6 +219,7 @@ __all__ = [
     "ModelError",
     "MujocoSimulator",
     "Multisine",
+    "OctaveLevels",
     "Parameter",
     "Parameters",
     "Peak",
@@ -213,6 +231,7 @@ __all__ = [
     "SchemeModel",
     "SchemeOutput",
     "SetupError",
+    "Severity",
     "Simulation",
     "StabilisationDiagram",
     "StructureInput",
@@ -231,6 +250,7 @@ __all__ = [
     "band_rms",
     "best_joint",
     "callable_simulator",
+    "cepstrum",
     "check_driving_point",
     "check_linearity",
     "check_reciprocity",
@@ -245,6 +265,7 @@ __all__ = [
     "differentiate_density",
     "drive_model",
     "element_block",
+    "envelope",
     "excite",
     "explained_model",
     "explained_simulator",
@@ -261,6 +282,8 @@ __all__ = [
     "integrate_density",
     "join_references",
     "joint_log",
+    "kurtogram",
+    "levels",
     "load_model",
     "load_robot",
     "load_setup",
@@ -273,6 +296,7 @@ __all__ = [
     "mr_record",
     "mujoco_simulator",
     "notebook",
+    "octaves",
     "open",
     "open_log",
     "optimise",
@@ -286,10 +310,10 @@ __all__ = [
     "robot_arm",
     "roving_hammer",
     "save_figures",
+    "severity",
     "shape_transmissibility",
     "show",
     "simulate",
-    "third_octave_levels",
     "transmissibility",
     "transmissibility_along",
     "treatments",
@@ -393,12 +417,15 @@ if TYPE_CHECKING:
     from chladni.robots.joint_log import joint_log
     from chladni.robots.loading import load_robot
     from chladni.robots.trajectory import write_trajectory
+    from chladni.signals.cepstrum import Cepstrum
     from chladni.signals.channel import Channel
     from chladni.signals.coherence import Coherence
     from chladni.signals.cross_spectra import CrossSpectra
+    from chladni.signals.envelope import Bearing, EnvelopeSpectrum, Kurtogram
     from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
     from chladni.signals.frequency_response import FrequencyResponse
     from chladni.signals.geometry import Geometry
+    from chladni.signals.levels import BandLevels, Levels, OctaveLevels, Severity
     from chladni.signals.modal_assurance import ModalAssurance
     from chladni.signals.mode_set import ModeSet
     from chladni.signals.peak import Peak
@@ -410,14 +437,19 @@ if TYPE_CHECKING:
     from chladni.signals.waterfall import Waterfall
     from chladni.spectral.accumulator import CrossSpectraAccumulator
     from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum, amplitude_spectrum
-    from chladni.spectral.bands import BandLevels, band_rms
+    from chladni.spectral.bands import band_rms
+    from chladni.spectral.cepstrum import cepstrum
     from chladni.spectral.coherence import coherence, partial_coherence
     from chladni.spectral.cross_spectra import cross_spectra
+    from chladni.spectral.envelope import envelope
     from chladni.spectral.forms import convert_form
     from chladni.spectral.impact import find_impacts, impact_cross_spectra
     from chladni.spectral.integration import differentiate, differentiate_density, integrate, integrate_density
+    from chladni.spectral.kurtogram import kurtogram
+    from chladni.spectral.levels import levels
+    from chladni.spectral.octaves import octaves
     from chladni.spectral.peaks import find_peaks, find_response_peaks
-    from chladni.spectral.third_octave import third_octave_levels
+    from chladni.spectral.severity import severity
     from chladni.spectral.transmissibility import transmissibility, transmissibility_along
     from chladni.spectral.waterfall import waterfall
     from chladni.viewers.figures.album import Album

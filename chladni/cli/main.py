@@ -14,15 +14,19 @@ from chladni import __version__
 from chladni.apps.stopping import LISTENER, Stopped
 from chladni.cli.bench import bench
 from chladni.cli.blind import blind
+from chladni.cli.cepstrum import cepstrum
 from chladni.cli.compare import compare
 from chladni.cli.convert import convert
 from chladni.cli.demo import demo
+from chladni.cli.envelope import envelope
 from chladni.cli.excite import excite
 from chladni.cli.frf import frf
 from chladni.cli.gap import gap
 from chladni.cli.influence import influence
 from chladni.cli.info import info
+from chladni.cli.levels import levels
 from chladni.cli.modes import modes
+from chladni.cli.octaves import octaves
 from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
 from chladni.cli.view import view
@@ -41,7 +45,25 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (info, psd, frf, modes, view, compare, convert, simulate, influence, gap, excite, bench, demo):
+for command in (
+    info,
+    levels,
+    psd,
+    octaves,
+    envelope,
+    cepstrum,
+    frf,
+    modes,
+    view,
+    compare,
+    convert,
+    simulate,
+    influence,
+    gap,
+    excite,
+    bench,
+    demo,
+):
     app.command()(command)
 app.add_typer(blind)
 

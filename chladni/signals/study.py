@@ -2,8 +2,11 @@
 
 from dataclasses import dataclass, field
 
+from chladni.signals.cepstrum import Cepstrum
+from chladni.signals.envelope import EnvelopeSpectrum
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry
+from chladni.signals.levels import Levels, OctaveLevels, Severity
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.peak import Peak
@@ -40,6 +43,14 @@ class Study(Drawn):
         Checks of the modes, or None.
     relative_motion
         Motion between neighbours in each mode, the greatest first.
+    levels, severities
+        Levels over all and running, and the severity of motions, one entry a sample rate.
+    octaves
+        Levels in octave bands, one entry a sample rate.
+    envelopes
+        Envelope spectra, one entry a channel.
+    cepstra
+        Cepstra, one entry a sample rate.
     geometry
         Where the points sit; empty when no setup file was given.
     findings
@@ -58,6 +69,11 @@ class Study(Drawn):
     modes: ModeSet | None = None
     validation: ModeValidation | None = None
     relative_motion: tuple[RelativeMotion, ...] = ()
+    levels: tuple[Levels, ...] = ()
+    severities: tuple[Severity, ...] = ()
+    octaves: tuple[OctaveLevels, ...] = ()
+    envelopes: tuple[EnvelopeSpectrum, ...] = ()
+    cepstra: tuple[Cepstrum, ...] = ()
     geometry: Geometry = field(default_factory=Geometry)
     findings: tuple[str, ...] = ()
     pictures: tuple[tuple[str, bytes], ...] = ()

@@ -6,12 +6,16 @@ from typing import Self
 from matplotlib.figure import Figure
 
 from chladni.signals.study import Study
+from chladni.viewers.figures.cepstrum import cepstrum_figures
 from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
+from chladni.viewers.figures.envelope import envelope_figures
 from chladni.viewers.figures.frequency_response import response_figures
+from chladni.viewers.figures.levels import level_figures
 from chladni.viewers.figures.mac import mac_figures
 from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
+from chladni.viewers.figures.octaves import octave_figures
 from chladni.viewers.figures.relative_motion import relative_motion_figures
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.stabilisation import stabilisation_figures
@@ -39,6 +43,10 @@ class Album:
         return cls(
             {
                 "waveforms": waveform_figures(study),
+                "levels": level_figures(study),
+                "octaves": octave_figures(study),
+                "envelopes": envelope_figures(study),
+                "cepstra": cepstrum_figures(study),
                 "densities": density_figures(study),
                 "responses": response_figures(study),
                 "nyquist": nyquist_figures(study),
