@@ -35,6 +35,12 @@ _HOME = {
     "cross_spectra": "chladni.spectral.cross_spectra",
     "coherence": "chladni.spectral.coherence",
     "waterfall": "chladni.spectral.waterfall",
+    "integrate": "chladni.spectral.integration",
+    "differentiate": "chladni.spectral.integration",
+    "lowpass": "chladni.spectral.filters",
+    "highpass": "chladni.spectral.filters",
+    "bandpass": "chladni.spectral.filters",
+    "bandstop": "chladni.spectral.filters",
     "mac": "chladni.modal.shapes.mac",
     "relative_motion": "chladni.modal.shapes.relative_motion",
     "validate": "chladni.modal.shapes.validation",
@@ -71,6 +77,7 @@ _HOME = {
     "LogError": "chladni.signals.errors",
     "ModelError": "chladni.signals.errors",
     "SetupError": "chladni.signals.errors",
+    "FilteredSeries": "chladni.signals.filtered_series",
 }
 
 __all__ = [
@@ -82,6 +89,7 @@ __all__ = [
     "CrossSpectra",
     "EnhancedFrequencyDomainDecomposition",
     "EstimateError",
+    "FilteredSeries",
     "FrequencyDomainDecomposition",
     "FrequencyResponse",
     "HalfPower",
@@ -97,19 +105,25 @@ __all__ = [
     "Wish",
     "analyse",
     "attached",
+    "bandpass",
+    "bandstop",
     "coherence",
     "cross_spectra",
     "diagnose_gap",
+    "differentiate",
     "excite",
     "find_peaks",
     "find_response_peaks",
     "frf",
+    "highpass",
     "identify_modes",
     "influence",
+    "integrate",
     "load_model",
     "load_robot",
     "load_setup",
     "locate_from_levels",
+    "lowpass",
     "mac",
     "open",
     "open_log",
@@ -166,6 +180,7 @@ if TYPE_CHECKING:
     from chladni.signals.coherence import Coherence
     from chladni.signals.cross_spectra import CrossSpectra
     from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
+    from chladni.signals.filtered_series import FilteredSeries
     from chladni.signals.frequency_response import FrequencyResponse
     from chladni.signals.modal_assurance import ModalAssurance
     from chladni.signals.mode_set import ModeSet
@@ -174,6 +189,8 @@ if TYPE_CHECKING:
     from chladni.signals.time_series import TimeSeries
     from chladni.spectral.coherence import coherence
     from chladni.spectral.cross_spectra import cross_spectra
+    from chladni.spectral.filters import bandpass, bandstop, highpass, lowpass
+    from chladni.spectral.integration import differentiate, integrate
     from chladni.spectral.peaks import find_peaks, find_response_peaks
     from chladni.spectral.waterfall import waterfall
 else:

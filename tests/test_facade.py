@@ -16,6 +16,13 @@ SURFACE = {
     "load_setup", "locate_from_levels", "mac",
     "open", "open_log", "optimise", "psd",
     "relative_motion", "show", "simulate", "validate", "waterfall", "write_mcap", "write_model",
+    "integrate",
+    "differentiate",
+    "lowpass",
+    "highpass",
+    "bandpass",
+    "bandstop",
+    "FilteredSeries",
 }  # fmt: skip
 HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard", "numba", "panel", "bokeh"}
 
