@@ -41,6 +41,7 @@ _HOME = {
     "highpass": "chladni.spectral.filters",
     "bandpass": "chladni.spectral.filters",
     "bandstop": "chladni.spectral.filters",
+    "srs": "chladni.spectral.shock",
     "mac": "chladni.modal.shapes.mac",
     "relative_motion": "chladni.modal.shapes.relative_motion",
     "validate": "chladni.modal.shapes.validation",
@@ -78,6 +79,7 @@ _HOME = {
     "ModelError": "chladni.signals.errors",
     "SetupError": "chladni.signals.errors",
     "FilteredSeries": "chladni.signals.filtered_series",
+    "ShockResponse": "chladni.signals.shock_response",
 }
 
 __all__ = [
@@ -100,6 +102,7 @@ __all__ = [
     "PolyReferenceLeastSquares",
     "PowerSpectralDensity",
     "SetupError",
+    "ShockResponse",
     "Study",
     "TimeSeries",
     "Wish",
@@ -133,6 +136,7 @@ __all__ = [
     "relative_motion",
     "show",
     "simulate",
+    "srs",
     "validate",
     "waterfall",
     "write_mcap",
@@ -185,6 +189,7 @@ if TYPE_CHECKING:
     from chladni.signals.modal_assurance import ModalAssurance
     from chladni.signals.mode_set import ModeSet
     from chladni.signals.power_spectral_density import PowerSpectralDensity
+    from chladni.signals.shock_response import ShockResponse
     from chladni.signals.study import Study
     from chladni.signals.time_series import TimeSeries
     from chladni.spectral.coherence import coherence
@@ -192,6 +197,7 @@ if TYPE_CHECKING:
     from chladni.spectral.filters import bandpass, bandstop, highpass, lowpass
     from chladni.spectral.integration import differentiate, integrate
     from chladni.spectral.peaks import find_peaks, find_response_peaks
+    from chladni.spectral.shock import srs
     from chladni.spectral.waterfall import waterfall
 else:
 

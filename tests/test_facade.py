@@ -23,6 +23,8 @@ SURFACE = {
     "bandpass",
     "bandstop",
     "FilteredSeries",
+    "srs",
+    "ShockResponse",
 }  # fmt: skip
 HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard", "numba", "panel", "bokeh"}
 

@@ -12,6 +12,7 @@ from chladni.signals.comparison import DensityComparison, LevelChange, PeakChang
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.shock_response import ShockResponse
 from chladni.spectral.bands import total_rms
 from chladni.spectral.peaks import find_peaks, judged_above_hz
 
@@ -63,6 +64,37 @@ def frf_document(response: FrequencyResponse, peaks: Sequence[Peak]) -> Document
             for column in range(len(response.references))
         ],
         "notes": list(response.provenance.notes),
+    }
+
+
+def shock_document(found: Sequence[ShockResponse]) -> Document:
+    """Document of ``chladni srs``.
+
+    The axis of the first sampling grid stands at the top; channels of other grids carry their own under the same key.
+    """
+    first = found[0]
+    channels = []
+    for response in found:
+        own_axis = {} if response is first else {"frequency_hz": plain(response.frequency_hz)}
+        channels += [
+            {
+                "name": channel.name,
+                "unit": channel.unit,
+                "maximax": plain(response.maximax[row]),
+                "positive": plain(response.positive[row]),
+                "negative": plain(response.negative[row]),
+                "offset": finite(float(response.offset[row])),
+                **own_axis,
+            }
+            for row, channel in enumerate(response.channels)
+        ]
+    return {
+        "format": "chladni.srs/1",
+        "frequency_hz": plain(first.frequency_hz),
+        "quantity": first.quantity,
+        "q": first.q,
+        "channels": channels,
+        "notes": list(dict.fromkeys(note for response in found for note in response.notes)),
     }
 
 

@@ -25,6 +25,7 @@ from chladni.cli.info import info
 from chladni.cli.modes import modes
 from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
+from chladni.cli.srs import srs
 from chladni.cli.view import view
 from chladni.signals.errors import ChladniError, LogError
 from chladni.signals.visible import visible, visible_lines
@@ -41,7 +42,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (info, psd, frf, modes, view, compare, convert, simulate, influence, gap, excite, bench, demo):
+for command in (info, psd, frf, modes, srs, view, compare, convert, simulate, influence, gap, excite, bench, demo):
     app.command()(command)
 app.add_typer(blind)
 

@@ -84,8 +84,8 @@ def bandpass(
 
     Notes
     -----
-    Designs, sections of second order and filtering are those of `scipy.signal`: ``iirfilter`` (bilinear transform;
-    Bessel with ``norm="mag"``), ``sosfilt`` and ``sosfiltfilt`` (Oppenheim & Schafer, Discrete-Time Signal
+    Designs, sections of second order and filtering are those of `scipy.signal`: ``butter`` and ``bessel`` (bilinear
+    transform; ``norm="mag"``), ``sosfilt`` and ``sosfiltfilt`` (Oppenheim & Schafer, Discrete-Time Signal
     Processing, 3rd ed., sections 7.2 and 5.9). With the impulse response h a transient lasts until the sum of abs(h)
     over what is left is 1 % of the whole: the most that samples before the run, no larger than those in it, can
     matter.
@@ -198,7 +198,7 @@ def _designed(
     kind: Kind, corners_hz: tuple[float, ...], *, order: int, design: Design, rate_hz: float
 ) -> tuple[Real, float]:
     """Sections of second order, and the magnitude of the pole that decays slowest."""
-    from scipy.signal import iirfilter, zpk2sos
+    from scipy.signal import bessel, butter
 
     edges = np.array([0.0, *corners_hz, rate_hz / 2])
     if not np.all(np.diff(edges) > 0):
@@ -209,11 +209,14 @@ def _designed(
     if not 1 <= order <= 20:
         raise EstimateError(f"order is {order}; it must lie between 1 and 20")
     corner = corners_hz[0] if len(corners_hz) == 1 else list(corners_hz)
-    ftype = {"butterworth": "butter", "bessel": "bessel_mag"}.get(design)
-    if ftype is None:
+    if design == "butterworth":
+        sections = butter(order, corner, btype=kind, output="sos", fs=rate_hz)
+    elif design == "bessel":
+        sections = bessel(order, corner, btype=kind, output="sos", norm="mag", fs=rate_hz)
+    else:
         raise EstimateError(f"design {design!r} is none of butterworth, bessel")
-    zeros, poles, gain = iirfilter(order, corner, btype=kind, ftype=ftype, output="zpk", fs=rate_hz)
-    return np.asarray(zpk2sos(zeros, poles, gain), dtype=np.float64), float(np.abs(poles).max())
+    slowest = max(float(np.abs(np.roots(section[3:])).max()) for section in sections)
+    return np.asarray(sections, dtype=np.float64), slowest
 
 
 def _settling_samples(sections: Real, slowest: float, *, causal: bool, at_most: int) -> int:
