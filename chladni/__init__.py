@@ -42,6 +42,9 @@ _HOME = {
     "bandpass": "chladni.spectral.filters",
     "bandstop": "chladni.spectral.filters",
     "srs": "chladni.spectral.shock",
+    "rotation": "chladni.spectral.rotation",
+    "order_map": "chladni.spectral.orders",
+    "order_cuts": "chladni.spectral.orders",
     "mac": "chladni.modal.shapes.mac",
     "relative_motion": "chladni.modal.shapes.relative_motion",
     "validate": "chladni.modal.shapes.validation",
@@ -80,6 +83,9 @@ _HOME = {
     "SetupError": "chladni.signals.errors",
     "FilteredSeries": "chladni.signals.filtered_series",
     "ShockResponse": "chladni.signals.shock_response",
+    "Rotation": "chladni.signals.rotation",
+    "OrderMap": "chladni.signals.order_spectra",
+    "OrderCuts": "chladni.signals.order_spectra",
 }
 
 __all__ = [
@@ -99,8 +105,11 @@ __all__ = [
     "ModalAssurance",
     "ModeSet",
     "ModelError",
+    "OrderCuts",
+    "OrderMap",
     "PolyReferenceLeastSquares",
     "PowerSpectralDensity",
+    "Rotation",
     "SetupError",
     "ShockResponse",
     "Study",
@@ -131,9 +140,12 @@ __all__ = [
     "open",
     "open_log",
     "optimise",
+    "order_cuts",
+    "order_map",
     "plot",
     "psd",
     "relative_motion",
+    "rotation",
     "show",
     "simulate",
     "srs",
@@ -188,7 +200,9 @@ if TYPE_CHECKING:
     from chladni.signals.frequency_response import FrequencyResponse
     from chladni.signals.modal_assurance import ModalAssurance
     from chladni.signals.mode_set import ModeSet
+    from chladni.signals.order_spectra import OrderCuts, OrderMap
     from chladni.signals.power_spectral_density import PowerSpectralDensity
+    from chladni.signals.rotation import Rotation
     from chladni.signals.shock_response import ShockResponse
     from chladni.signals.study import Study
     from chladni.signals.time_series import TimeSeries
@@ -196,7 +210,9 @@ if TYPE_CHECKING:
     from chladni.spectral.cross_spectra import cross_spectra
     from chladni.spectral.filters import bandpass, bandstop, highpass, lowpass
     from chladni.spectral.integration import differentiate, integrate
+    from chladni.spectral.orders import order_cuts, order_map
     from chladni.spectral.peaks import find_peaks, find_response_peaks
+    from chladni.spectral.rotation import rotation
     from chladni.spectral.shock import srs
     from chladni.spectral.waterfall import waterfall
 else:

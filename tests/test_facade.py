@@ -25,6 +25,12 @@ SURFACE = {
     "FilteredSeries",
     "srs",
     "ShockResponse",
+    "rotation",
+    "order_map",
+    "order_cuts",
+    "Rotation",
+    "OrderMap",
+    "OrderCuts",
 }  # fmt: skip
 HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard", "numba", "panel", "bokeh"}
 

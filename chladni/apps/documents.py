@@ -18,6 +18,7 @@ from chladni.spectral.peaks import find_peaks, judged_above_hz
 
 if TYPE_CHECKING:
     from chladni.apps.compare import LogComparison
+    from chladni.apps.orders import OrderStudy
 
 Document = dict[str, Any]
 
@@ -95,6 +96,39 @@ def shock_document(found: Sequence[ShockResponse]) -> Document:
         "q": first.q,
         "channels": channels,
         "notes": list(dict.fromkeys(note for response in found for note in response.notes)),
+    }
+
+
+def orders_document(found: "OrderStudy") -> Document:
+    """Document of ``chladni orders``; each sampling grid has points of its own."""
+    return {
+        "format": "chladni.orders/1",
+        "rotation": found.rotation.source,
+        "method": found.cuts[0].method,
+        "orders": plain(found.cuts[0].orders),
+        "grids": [
+            {
+                "time_s": plain(cuts.time_s),
+                "speed_hz": plain(cuts.speed_hz),
+                "channels": [
+                    {
+                        "name": channel.name,
+                        "unit": channel.unit,
+                        "cuts": [
+                            {
+                                "order": order,
+                                "amplitude": plain(np.abs(cuts.values[row, place])),
+                                "phase_deg": plain(np.angle(cuts.values[row, place], deg=True)),
+                            }
+                            for place, order in enumerate(cuts.orders.tolist())
+                        ],
+                    }
+                    for row, channel in enumerate(cuts.channels)
+                ],
+            }
+            for cuts in found.cuts
+        ],
+        "notes": list(found.rotation.notes),
     }
 
 

@@ -23,6 +23,7 @@ from chladni.cli.gap import gap
 from chladni.cli.influence import influence
 from chladni.cli.info import info
 from chladni.cli.modes import modes
+from chladni.cli.orders import orders
 from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
 from chladni.cli.srs import srs
@@ -42,7 +43,23 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (info, psd, frf, modes, srs, view, compare, convert, simulate, influence, gap, excite, bench, demo):
+for command in (
+    info,
+    psd,
+    frf,
+    modes,
+    srs,
+    orders,
+    view,
+    compare,
+    convert,
+    simulate,
+    influence,
+    gap,
+    excite,
+    bench,
+    demo,
+):
     app.command()(command)
 app.add_typer(blind)
 

@@ -101,6 +101,7 @@ def commands(path: Path, folder: Path) -> Iterator[tuple[object, ...]]:
     force, motion = numbered(names, "force"), numbered(names, "motion")
     yield "info", path
     yield "psd", path
+    yield "orders", path, "--ridge", motion, "--order", 1, "--figures", folder
     yield "srs", path, "--channel", motion, "--figures", folder
     yield "frf", path, "--reference", force, "--response", motion
     yield ("modes", path, "--reference", force, "--channel", motion, "--count", 1, "--csv", folder / "m.csv",
