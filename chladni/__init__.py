@@ -45,6 +45,10 @@ _HOME = {
     "rotation": "chladni.spectral.rotation",
     "order_map": "chladni.spectral.orders",
     "order_cuts": "chladni.spectral.orders",
+    "cross_correlation": "chladni.spectral.delay",
+    "time_delay": "chladni.spectral.delay",
+    "transmissibility": "chladni.spectral.transmissibility",
+    "deflection_shapes": "chladni.spectral.deflection",
     "mac": "chladni.modal.shapes.mac",
     "relative_motion": "chladni.modal.shapes.relative_motion",
     "validate": "chladni.modal.shapes.validation",
@@ -86,6 +90,9 @@ _HOME = {
     "Rotation": "chladni.signals.rotation",
     "OrderMap": "chladni.signals.order_spectra",
     "OrderCuts": "chladni.signals.order_spectra",
+    "CrossCorrelation": "chladni.signals.cross_correlation",
+    "TimeDelays": "chladni.signals.cross_correlation",
+    "DeflectionShapes": "chladni.signals.deflection_shapes",
 }
 
 __all__ = [
@@ -94,7 +101,9 @@ __all__ = [
     "CircleFit",
     "Coherence",
     "CovarianceDrivenSubspace",
+    "CrossCorrelation",
     "CrossSpectra",
+    "DeflectionShapes",
     "EnhancedFrequencyDomainDecomposition",
     "EstimateError",
     "FilteredSeries",
@@ -113,6 +122,7 @@ __all__ = [
     "SetupError",
     "ShockResponse",
     "Study",
+    "TimeDelays",
     "TimeSeries",
     "Wish",
     "analyse",
@@ -120,7 +130,9 @@ __all__ = [
     "bandpass",
     "bandstop",
     "coherence",
+    "cross_correlation",
     "cross_spectra",
+    "deflection_shapes",
     "diagnose_gap",
     "differentiate",
     "excite",
@@ -149,6 +161,8 @@ __all__ = [
     "show",
     "simulate",
     "srs",
+    "time_delay",
+    "transmissibility",
     "validate",
     "waterfall",
     "write_mcap",
@@ -194,7 +208,9 @@ if TYPE_CHECKING:
     from chladni.robots.loading import load_robot
     from chladni.signals.channel import Channel
     from chladni.signals.coherence import Coherence
+    from chladni.signals.cross_correlation import CrossCorrelation, TimeDelays
     from chladni.signals.cross_spectra import CrossSpectra
+    from chladni.signals.deflection_shapes import DeflectionShapes
     from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
     from chladni.signals.filtered_series import FilteredSeries
     from chladni.signals.frequency_response import FrequencyResponse
@@ -208,12 +224,15 @@ if TYPE_CHECKING:
     from chladni.signals.time_series import TimeSeries
     from chladni.spectral.coherence import coherence
     from chladni.spectral.cross_spectra import cross_spectra
+    from chladni.spectral.deflection import deflection_shapes
+    from chladni.spectral.delay import cross_correlation, time_delay
     from chladni.spectral.filters import bandpass, bandstop, highpass, lowpass
     from chladni.spectral.integration import differentiate, integrate
     from chladni.spectral.orders import order_cuts, order_map
     from chladni.spectral.peaks import find_peaks, find_response_peaks
     from chladni.spectral.rotation import rotation
     from chladni.spectral.shock import srs
+    from chladni.spectral.transmissibility import transmissibility
     from chladni.spectral.waterfall import waterfall
 else:
 

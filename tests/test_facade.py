@@ -31,6 +31,13 @@ SURFACE = {
     "Rotation",
     "OrderMap",
     "OrderCuts",
+    "cross_correlation",
+    "time_delay",
+    "CrossCorrelation",
+    "TimeDelays",
+    "transmissibility",
+    "deflection_shapes",
+    "DeflectionShapes",
 }  # fmt: skip
 HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard", "numba", "panel", "bokeh"}
 

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.comparison import DensityComparison, LevelChange, PeakChange
+from chladni.signals.cross_correlation import TimeDelays
+from chladni.signals.deflection_shapes import DeflectionShapes
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -129,6 +131,53 @@ def orders_document(found: "OrderStudy") -> Document:
             for cuts in found.cuts
         ],
         "notes": list(found.rotation.notes),
+    }
+
+
+def delay_document(found: TimeDelays) -> Document:
+    """Document of ``chladni delay``."""
+    return {
+        "format": "chladni.delay/1",
+        "reference": found.reference.name,
+        "band_hz": list(found.band_hz),
+        "delays": [
+            {
+                "response": channel.name,
+                "delay_s": finite(float(found.delay_s[row])),
+                "std_s": finite(float(found.std_s[row])),
+                "coherence": finite(float(found.coherence[row])),
+                "inverted": found.inverted[row],
+            }
+            for row, channel in enumerate(found.responses)
+        ],
+        "notes": list(found.notes),
+    }
+
+
+def deflection_document(found: DeflectionShapes) -> Document:
+    """Document of ``chladni ods``."""
+    return {
+        "format": "chladni.ods/1",
+        "reference": found.reference,
+        "bandwidth_hz": found.bandwidth_hz,
+        "shapes": [
+            {
+                "frequency_hz": frequency_hz,
+                "shape": [
+                    {
+                        "channel": channel.name,
+                        "unit": channel.unit,
+                        "rms": finite(float(abs(found.values[row, column]))),
+                        "std": finite(float(found.std[row, column])),
+                        "phase_deg": finite(float(np.angle(found.values[row, column], deg=True))),
+                        "coherence": finite(float(found.coherence[row, column])),
+                    }
+                    for column, channel in enumerate(found.channels)
+                ],
+            }
+            for row, frequency_hz in enumerate(found.frequency_hz.tolist())
+        ],
+        "notes": list(found.provenance.notes),
     }
 
 

@@ -13,6 +13,7 @@ from chladni.io.log_info import some_of
 from chladni.io.source import SeriesLike, log_or_series
 from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
+from chladni.signals.deflection_shapes import DeflectionShapes
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -24,6 +25,7 @@ from chladni.signals.wording import rounded_up
 from chladni.spectral.adaptive import adaptive_auto_spectra, adaptive_cross_spectra
 from chladni.spectral.bands import band_rms, total_rms
 from chladni.spectral.blocks import Source
+from chladni.spectral.deflection import deflection_shapes
 from chladni.spectral.excitation import HAMMER_RANGE
 from chladni.spectral.frequency_response import Estimator, frequency_response
 from chladni.spectral.peaks import judged_above_hz
@@ -273,6 +275,38 @@ def transfer(
         )
     except EstimateError as error:
         raise EstimateError(f"{source.path.name}: {error}") from error
+
+
+def log_deflection(
+    log: Log,
+    *,
+    reference: str,
+    channels: Sequence[str] | None,
+    frequencies_hz: Sequence[float] | None,
+    averaging: Averaging,
+    span: Span,
+    progress: Progress = no_progress,
+) -> DeflectionShapes:
+    """Give the deflection shapes of named channels, or of all that share the reference's sampling grid and change.
+
+    Raises
+    ------
+    LogError
+        When there is no such channel.
+    EstimateError
+        As `deflection_shapes` does.
+    """
+    references = log.names([reference])
+    names = None if channels is None else tuple(dict.fromkeys((*references, *channels)))
+    grid = _grid_of(log, references, names, span, progress)
+    try:
+        spectra = averaging.spectra(grid, references)
+        _require_moving(grid, references)
+        spectra = _without_constant(spectra, grid, keep=references)
+        spectra = replace(spectra, provenance=spectra.provenance.with_notes(*grid.notes))
+        return deflection_shapes(spectra, reference=references[0], frequencies_hz=frequencies_hz)
+    except EstimateError as error:
+        raise EstimateError(f"{log.path.name}: {error}") from error
 
 
 def _told_excitations(source: Log | TimeSeries, span: Span) -> tuple[str, ...]:

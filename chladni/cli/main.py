@@ -16,6 +16,7 @@ from chladni.cli.bench import bench
 from chladni.cli.blind import blind
 from chladni.cli.compare import compare
 from chladni.cli.convert import convert
+from chladni.cli.delay import delay
 from chladni.cli.demo import demo
 from chladni.cli.excite import excite
 from chladni.cli.frf import frf
@@ -23,6 +24,7 @@ from chladni.cli.gap import gap
 from chladni.cli.influence import influence
 from chladni.cli.info import info
 from chladni.cli.modes import modes
+from chladni.cli.ods import ods
 from chladni.cli.orders import orders
 from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
@@ -50,6 +52,8 @@ for command in (
     modes,
     srs,
     orders,
+    ods,
+    delay,
     view,
     compare,
     convert,

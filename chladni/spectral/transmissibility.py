@@ -7,23 +7,31 @@ from itertools import pairwise
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.time_series import TimeSeries
 from chladni.signals.unit_text import in_unit
+from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.frequency_response import frequency_response
 
 
 def transmissibility(
-    spectra: CrossSpectra, *, reference: str, responses: str | Sequence[str] | None = None
+    source: CrossSpectra | TimeSeries,
+    *,
+    reference: str,
+    responses: str | Sequence[str] | None = None,
+    resolution_hz: float | None = None,
 ) -> FrequencyResponse:
     """Estimate how motion passes from one point to others, T = response/reference.
 
     Parameters
     ----------
-    spectra
-        Averaged cross-spectra that hold the motions.
+    source
+        Averaged cross-spectra that hold the motions; of a series they are averaged first.
     reference
         Name of the channel at the point where the motion comes from.
     responses
         Names of the channels it goes to; None takes every other channel in the reference's unit.
+    resolution_hz
+        Of a series, distance of the lines.
 
     Returns
     -------
@@ -41,6 +49,7 @@ def transmissibility(
     -----
     T1 = G_ref,resp / G_ref,ref: H1 with a motion as its reference, and with the random error of H1.
     """
+    spectra = source if isinstance(source, CrossSpectra) else cross_spectra(source, resolution_hz=resolution_hz)
     unit = spectra.channels[spectra.index(reference)].unit
     if responses is None:
         chosen = [c.name for c in spectra.channels if c.unit == unit and c.name != reference]

@@ -42,6 +42,26 @@ INSIDE = [1e-59, *(pytest.param(size, marks=pytest.mark.nightly) for size in (1e
 Verb = Callable[[Path, Path, Path], list[object]]
 VERBS: dict[str, Verb] = {
     "psd": lambda log, folder, _: ["psd", log, "--json", folder / "o.json"],
+    "ods": lambda log, folder, _: [
+        "ods",
+        log,
+        "--reference",
+        "/a.acc",
+        "--frequency",
+        50,
+        "--json",
+        folder / "o.json",
+    ],
+    "delay": lambda log, folder, _: [
+        "delay",
+        log,
+        "--reference",
+        "/a.force",
+        "--response",
+        "/a.acc",
+        "--json",
+        folder / "o.json",
+    ],
     "srs": lambda log, folder, _: ["srs", log, "--json", folder / "o.json"],
     "frf": lambda log, folder, _: ["frf", log, "--json", folder / "o.json"],
     "modes": lambda log, folder, _: ["modes", log, "--json", folder / "o.json"],

@@ -102,6 +102,8 @@ def commands(path: Path, folder: Path) -> Iterator[tuple[object, ...]]:
     yield "info", path
     yield "psd", path
     yield "orders", path, "--ridge", motion, "--order", 1, "--figures", folder
+    yield "ods", path, "--reference", motion, "--frequency", 30, "--figures", folder
+    yield "delay", path, "--reference", force, "--response", motion, "--figures", folder
     yield "srs", path, "--channel", motion, "--figures", folder
     yield "frf", path, "--reference", force, "--response", motion
     yield ("modes", path, "--reference", force, "--channel", motion, "--count", 1, "--csv", folder / "m.csv",

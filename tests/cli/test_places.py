@@ -71,6 +71,8 @@ def test_standard_output_and_what_was_not_given_are_no_files(
         ["info", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["psd", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["orders", "{log}", "--speed", "/x", "--setup", "{other}", "--json", "{other}"],
+        ["ods", "{log}", "--reference", "/x", "--setup", "{other}", "--json", "{other}"],
+        ["delay", "{log}", "--reference", "/x", "--setup", "{other}", "--json", "{other}"],
         ["srs", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["frf", "{log}", "--reference", "/x", "--setup", "{other}", "--json", "{other}"],
         ["modes", "{log}", "--setup", "{other}", "--json", "{other}"],
