@@ -49,6 +49,13 @@ _HOME = {
     "time_delay": "chladni.spectral.delay",
     "transmissibility": "chladni.spectral.transmissibility",
     "deflection_shapes": "chladni.spectral.deflection",
+    "zoom_spectrum": "chladni.spectral.zoom",
+    "amplitude_spectrum": "chladni.spectral.amplitude_spectrum",
+    "AmplitudeSpectrum": "chladni.spectral.amplitude_spectrum",
+    "random_profile": "chladni.spectral.random_vibration",
+    "check_profile": "chladni.spectral.random_vibration",
+    "probability_density": "chladni.spectral.random_vibration",
+    "vibration_response": "chladni.spectral.random_vibration",
     "mac": "chladni.modal.shapes.mac",
     "relative_motion": "chladni.modal.shapes.relative_motion",
     "validate": "chladni.modal.shapes.validation",
@@ -93,9 +100,14 @@ _HOME = {
     "CrossCorrelation": "chladni.signals.cross_correlation",
     "TimeDelays": "chladni.signals.cross_correlation",
     "DeflectionShapes": "chladni.signals.deflection_shapes",
+    "RandomProfile": "chladni.signals.random_vibration",
+    "ProfileCheck": "chladni.signals.random_vibration",
+    "ProbabilityDensity": "chladni.signals.random_vibration",
+    "VibrationResponse": "chladni.signals.random_vibration",
 }
 
 __all__ = [
+    "AmplitudeSpectrum",
     "Channel",
     "ChladniError",
     "CircleFit",
@@ -118,17 +130,23 @@ __all__ = [
     "OrderMap",
     "PolyReferenceLeastSquares",
     "PowerSpectralDensity",
+    "ProbabilityDensity",
+    "ProfileCheck",
+    "RandomProfile",
     "Rotation",
     "SetupError",
     "ShockResponse",
     "Study",
     "TimeDelays",
     "TimeSeries",
+    "VibrationResponse",
     "Wish",
+    "amplitude_spectrum",
     "analyse",
     "attached",
     "bandpass",
     "bandstop",
+    "check_profile",
     "coherence",
     "cross_correlation",
     "cross_spectra",
@@ -155,7 +173,9 @@ __all__ = [
     "order_cuts",
     "order_map",
     "plot",
+    "probability_density",
     "psd",
+    "random_profile",
     "relative_motion",
     "rotation",
     "show",
@@ -164,9 +184,11 @@ __all__ = [
     "time_delay",
     "transmissibility",
     "validate",
+    "vibration_response",
     "waterfall",
     "write_mcap",
     "write_model",
+    "zoom_spectrum",
 ]
 
 # What values call to be drawn and made into tables.
@@ -218,10 +240,12 @@ if TYPE_CHECKING:
     from chladni.signals.mode_set import ModeSet
     from chladni.signals.order_spectra import OrderCuts, OrderMap
     from chladni.signals.power_spectral_density import PowerSpectralDensity
+    from chladni.signals.random_vibration import ProbabilityDensity, ProfileCheck, RandomProfile, VibrationResponse
     from chladni.signals.rotation import Rotation
     from chladni.signals.shock_response import ShockResponse
     from chladni.signals.study import Study
     from chladni.signals.time_series import TimeSeries
+    from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum, amplitude_spectrum
     from chladni.spectral.coherence import coherence
     from chladni.spectral.cross_spectra import cross_spectra
     from chladni.spectral.deflection import deflection_shapes
@@ -230,10 +254,17 @@ if TYPE_CHECKING:
     from chladni.spectral.integration import differentiate, integrate
     from chladni.spectral.orders import order_cuts, order_map
     from chladni.spectral.peaks import find_peaks, find_response_peaks
+    from chladni.spectral.random_vibration import (
+        check_profile,
+        probability_density,
+        random_profile,
+        vibration_response,
+    )
     from chladni.spectral.rotation import rotation
     from chladni.spectral.shock import srs
     from chladni.spectral.transmissibility import transmissibility
     from chladni.spectral.waterfall import waterfall
+    from chladni.spectral.zoom import zoom_spectrum
 else:
 
     def __getattr__(name: str) -> object:

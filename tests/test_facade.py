@@ -38,6 +38,17 @@ SURFACE = {
     "transmissibility",
     "deflection_shapes",
     "DeflectionShapes",
+    "zoom_spectrum",
+    "amplitude_spectrum",
+    "AmplitudeSpectrum",
+    "random_profile",
+    "check_profile",
+    "probability_density",
+    "vibration_response",
+    "RandomProfile",
+    "ProfileCheck",
+    "ProbabilityDensity",
+    "VibrationResponse",
 }  # fmt: skip
 HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard", "numba", "panel", "bokeh"}
 

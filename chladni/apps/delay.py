@@ -41,7 +41,7 @@ def log_delays(
     try:
         found = time_delay(
             series,
-            reference=first,
+            references=first,
             band_hz=band_hz,
             longest_delay_s=longest_delay_s,
             resolution_hz=resolution_hz,

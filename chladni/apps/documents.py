@@ -15,12 +15,14 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.shock_response import ShockResponse
+from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum
 from chladni.spectral.bands import total_rms
 from chladni.spectral.peaks import find_peaks, judged_above_hz
 
 if TYPE_CHECKING:
     from chladni.apps.compare import LogComparison
     from chladni.apps.orders import OrderStudy
+    from chladni.apps.tolerance import Tolerated
 
 Document = dict[str, Any]
 
@@ -178,6 +180,51 @@ def deflection_document(found: DeflectionShapes) -> Document:
             for row, frequency_hz in enumerate(found.frequency_hz.tolist())
         ],
         "notes": list(found.provenance.notes),
+    }
+
+
+def tolerance_document(found: "Sequence[Tolerated]") -> Document:
+    """Document of ``chladni tolerance``; each sampling grid has lines of its own."""
+    profile = found[0].check.profile
+    return {
+        "format": "chladni.tolerance/1",
+        "unit": profile.unit,
+        "profile": [
+            {"frequency_hz": frequency_hz, "psd": psd}
+            for frequency_hz, psd in zip(profile.frequency_hz.tolist(), profile.density.tolist(), strict=True)
+        ],
+        "profile_rms": profile.rms(),
+        "upper_db": profile.upper_db,
+        "lower_db": profile.lower_db,
+        "channels": [
+            {
+                "name": channel.name,
+                "rms": finite(float(one.check.rms[row])),
+                "outside": finite(float(one.check.outside[row])),
+                "std_db": finite(float(one.check.std_db[row])),
+                "frequency_hz": plain(one.check.frequency_hz),
+                "deviation_db": plain(one.check.deviation_db[row]),
+            }
+            for one in found
+            for row, channel in enumerate(one.check.channels)
+        ],
+        "notes": [note for one in found for note in one.density.provenance.notes],
+    }
+
+
+def zoom_document(found: Sequence[AmplitudeSpectrum]) -> Document:
+    """Document of ``chladni zoom``; all sampling grids have the same lines."""
+    return {
+        "format": "chladni.zoom/1",
+        "frequency_hz": plain(found[0].frequency_hz),
+        "quantity": found[0].quantity,
+        "window": found[0].provenance.window,
+        "channels": [
+            {"name": channel.name, "unit": channel.unit, "amplitude": plain(one.values[row])}
+            for one in found
+            for row, channel in enumerate(one.channels)
+        ],
+        "notes": list(dict.fromkeys(note for one in found for note in one.provenance.notes)),
     }
 
 

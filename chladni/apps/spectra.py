@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import rounded_up
 from chladni.spectral.adaptive import adaptive_auto_spectra, adaptive_cross_spectra
+from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum
 from chladni.spectral.bands import band_rms, total_rms
 from chladni.spectral.blocks import Source
 from chladni.spectral.deflection import deflection_shapes
@@ -34,6 +35,7 @@ from chladni.spectral.products import PAIRS
 from chladni.spectral.response_advice import longest_segment_s
 from chladni.spectral.segmentation import SHORTEST_SEGMENT
 from chladni.spectral.windows import Window
+from chladni.spectral.zoom import zoom_spectrum
 
 SpectraT = TypeVar("SpectraT", CrossSpectra, PowerSpectralDensity)
 
@@ -304,7 +306,30 @@ def log_deflection(
         _require_moving(grid, references)
         spectra = _without_constant(spectra, grid, keep=references)
         spectra = replace(spectra, provenance=spectra.provenance.with_notes(*grid.notes))
-        return deflection_shapes(spectra, reference=references[0], frequencies_hz=frequencies_hz)
+        return deflection_shapes(spectra, references=references[0], frequencies_hz=frequencies_hz)
+    except EstimateError as error:
+        raise EstimateError(f"{log.path.name}: {error}") from error
+
+
+def zoomed(log: Log, *, channels: Sequence[str] | None, span: Span, **options: Any) -> tuple[AmplitudeSpectrum, ...]:
+    """Zoom into named channels, or all that change, one value for each sampling grid; options are `zoom_spectrum`'s.
+
+    Raises
+    ------
+    LogError
+        When there is no such channel.
+    EstimateError
+        As `zoom_spectrum` does.
+    """
+    groups = log.read_groups(channels, start_s=span.start_s, end_s=span.end_s)
+    if channels is None:
+        moving = [
+            [c.name for c, row in zip(one.channels, one.values, strict=True) if np.nanmin(row) < np.nanmax(row)]
+            for one in groups
+        ]
+        groups = tuple(one.select(names) for one, names in zip(groups, moving, strict=True) if names) or groups
+    try:
+        return tuple(zoom_spectrum(one, **options) for one in groups)
     except EstimateError as error:
         raise EstimateError(f"{log.path.name}: {error}") from error
 

@@ -29,7 +29,9 @@ from chladni.cli.orders import orders
 from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
 from chladni.cli.srs import srs
+from chladni.cli.tolerance import tolerance
 from chladni.cli.view import view
+from chladni.cli.zoom import zoom
 from chladni.signals.errors import ChladniError, LogError
 from chladni.signals.visible import visible, visible_lines
 from chladni.signals.wording import counted
@@ -54,6 +56,8 @@ for command in (
     orders,
     ods,
     delay,
+    tolerance,
+    zoom,
     view,
     compare,
     convert,

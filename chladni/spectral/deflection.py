@@ -17,7 +17,7 @@ from chladni.spectral.power_spectral_density import power_spectral_density
 def deflection_shapes(
     source: CrossSpectra | TimeSeries,
     *,
-    reference: str,
+    references: str,
     frequencies_hz: Sequence[float] | None = None,
     resolution_hz: float | None = None,
 ) -> DeflectionShapes:
@@ -27,7 +27,7 @@ def deflection_shapes(
     ----------
     source
         Averaged cross-spectra of all points measured at once; of a series they are averaged first.
-    reference
+    references
         Name of the channel whose phase is 0; one that moves at every frequency asked for.
     frequencies_hz
         Where; the nearest line is taken. None takes the named peaks of all channels.
@@ -60,17 +60,17 @@ def deflection_shapes(
     ...     sample_rate_hz=1000.0,
     ...     channels=(Channel(name="base", unit="m/s^2"), Channel(name="tip", unit="m/s^2")),
     ... )
-    >>> shape = deflection_shapes(x, reference="base", frequencies_hz=[20.0], resolution_hz=1.0)
+    >>> shape = deflection_shapes(x, references="base", frequencies_hz=[20.0], resolution_hz=1.0)
     >>> [round(float(part), 3) for part in (abs(shape.values[0, 1]) * 2**0.5, np.angle(shape.values[0, 1], deg=True))]
     [3.0, -90.0]
     """
     spectra = source if isinstance(source, CrossSpectra) else cross_spectra(source, resolution_hz=resolution_hz)
-    row = spectra.index(reference)
+    row = spectra.index(references)
     lines = _lines(spectra, frequencies_hz)
     own = spectra.density[row, row, lines].real
     if np.any(own <= 0):
         still = float(spectra.frequency_hz[lines[int(np.argmin(own))]])
-        raise EstimateError(f"{reference} doesn't move at {still:g} Hz; take another reference")
+        raise EstimateError(f"{spectra.channels[row].name} doesn't move at {still:g} Hz; take another reference")
     cross = spectra.density[row][:, lines].T
     auto = np.einsum("iif->fi", spectra.density[:, :, lines]).real
     coherence = np.divide(np.abs(cross) ** 2, own[:, None] * auto, out=np.zeros(auto.shape), where=auto > 0)

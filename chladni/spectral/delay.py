@@ -33,7 +33,7 @@ class _Delay:
 def cross_correlation(
     series: TimeSeries,
     *,
-    reference: str,
+    references: str,
     responses: str | Sequence[str] | None = None,
     longest_lag_s: float | None = None,
 ) -> CrossCorrelation:
@@ -43,7 +43,7 @@ def cross_correlation(
     ----------
     series
         Channels on one clock; their means are taken off.
-    reference
+    references
         Name of the channel that the others are held against.
     responses
         Names of the others; None for all.
@@ -74,11 +74,11 @@ def cross_correlation(
     ...     sample_rate_hz=100.0,
     ...     channels=(Channel(name="a"), Channel(name="b")),
     ... )
-    >>> found = cross_correlation(pair, reference="a", longest_lag_s=1.0)
+    >>> found = cross_correlation(pair, references="a", longest_lag_s=1.0)
     >>> float(found.lag_s[found.values[0].argmax()])
     0.3
     """
-    chosen = _chosen(series, reference, responses)
+    chosen = _chosen(series, references, responses)
     values = _whole_run(chosen)
     longest = values.shape[1] // 2 if longest_lag_s is None else round(longest_lag_s * chosen.sample_rate_hz)
     if not 0 < longest < values.shape[1]:
@@ -93,7 +93,7 @@ def cross_correlation(
 def time_delay(
     series: TimeSeries,
     *,
-    reference: str,
+    references: str,
     responses: str | Sequence[str] | None = None,
     band_hz: tuple[float, float] | None = None,
     longest_delay_s: float | None = None,
@@ -105,7 +105,7 @@ def time_delay(
     ----------
     series
         Channels on one clock.
-    reference, responses
+    references, responses
         As for `cross_correlation`.
     band_hz
         Frequencies to use; None for all. Between points of a structure that resonates, a band without resonances:
@@ -133,16 +133,22 @@ def time_delay(
     ASSP 24(4); Bendat & Piersol 2010, eq. 9.52). A note tells when another peak is nearly as high, or when phases
     lie farther off the line than their scatter explains.
     """
-    chosen = _chosen(series, reference, responses)
+    chosen = _chosen(series, references, responses)
     nyquist_hz = chosen.sample_rate_hz / 2
     low_hz, high_hz = (0.0, nyquist_hz) if band_hz is None else band_hz
     if not 0 <= low_hz < high_hz <= nyquist_hz:
         raise EstimateError(f"a band from {low_hz:g} to {high_hz:g} Hz isn't one within 0 to {nyquist_hz:g} Hz")
     filtered = _within(chosen, low_hz, high_hz)
     longest_s = filtered.duration_s / 10 if longest_delay_s is None else longest_delay_s
-    correlation = cross_correlation(filtered, reference=reference, responses=responses, longest_lag_s=longest_s)
+    correlation = cross_correlation(filtered, references=references, responses=responses, longest_lag_s=longest_s)
     found = [
-        _fitted(chosen.select([reference, channel.name]), row, correlation, (low_hz, high_hz), resolution_hz)
+        _fitted(
+            chosen.select([correlation.reference.name, channel.name]),
+            row,
+            correlation,
+            (low_hz, high_hz),
+            resolution_hz,
+        )
         for row, channel in enumerate(correlation.responses)
     ]
     peaks = np.abs(correlation.values)

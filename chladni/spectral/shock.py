@@ -35,7 +35,7 @@ def srs(
     quantity: ShockQuantity = "absolute-acceleration",
     band_hz: tuple[float, float] | None = None,
     lines_an_octave: int = 12,
-    frequency_hz: Real | Sequence[float] | None = None,
+    frequencies_hz: Real | Sequence[float] | None = None,
     offset: Offset = "first",
 ) -> ShockResponse:
     """Compute shock response spectra of base accelerations.
@@ -54,7 +54,7 @@ def srs(
         rate.
     lines_an_octave
         Natural frequencies an octave, at 1 kHz 2^(k/n).
-    frequency_hz
+    frequencies_hz
         Natural frequencies themselves, rising, in place of `band_hz`.
     offset
         What is taken off first, so that the oscillators begin at rest, such as gravity: the ``first`` sample; the
@@ -87,7 +87,7 @@ def srs(
     >>> t = np.arange(4000) / 20_000
     >>> pulse = np.where(t < 0.011, 500 * np.sin(np.pi * t / 0.011), 0.0)  # half a sine of 11 ms
     >>> x = TimeSeries(values=pulse[None], sample_rate_hz=20e3, channels=(Channel(name="a", unit="m/s^2"),))
-    >>> spectrum = srs(x, q=1000.0, frequency_hz=[0.8 / 0.011])  # undamped: 1.77 times as much, at most
+    >>> spectrum = srs(x, q=1000.0, frequencies_hz=[0.8 / 0.011])  # undamped: 1.77 times as much, at most
     >>> float((spectrum.maximax[0, 0] / 500).round(2))
     1.77
     """
@@ -98,7 +98,7 @@ def srs(
     if empty := [channel.name for channel, row in zip(series.channels, measured, strict=True) if not row.any()]:
         raise EstimateError(f"{', '.join(empty)}: nothing was measured; leave it out")
     require_in_range(series.channels, np.max(np.abs(series.values), axis=1, initial=0.0, where=measured))
-    lines_hz = _lines(series, measured, band_hz, lines_an_octave, frequency_hz)
+    lines_hz = _lines(series, measured, band_hz, lines_an_octave, frequencies_hz)
     bank = _Bank(lines_hz=lines_hz, rate_hz=series.sample_rate_hz, q=q, quantity=quantity)
     rows = [_of_channel(bank, values, mask, offset) for values, mask in zip(series.values, measured, strict=True)]
     units = [_unit(channel.unit, quantity) for channel in series.channels]
@@ -181,15 +181,15 @@ def _lines(
     measured: Mask,
     band_hz: tuple[float, float] | None,
     lines_an_octave: int,
-    frequency_hz: Real | Sequence[float] | None,
+    frequencies_hz: Real | Sequence[float] | None,
 ) -> Real:
     nyquist_hz = series.sample_rate_hz / 2
-    if frequency_hz is None:
+    if frequencies_hz is None:
         lines_hz = _ladder(series, measured, band_hz, lines_an_octave)
     elif band_hz is not None:
-        raise EstimateError("frequency_hz and band_hz are both given; give one of them")
+        raise EstimateError("frequencies_hz and band_hz are both given; give one of them")
     else:
-        lines_hz = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+        lines_hz = np.atleast_1d(np.asarray(frequencies_hz, dtype=np.float64))
     if not (lines_hz.size and np.all(np.diff(lines_hz, prepend=0.0) > 0) and lines_hz[-1] <= nyquist_hz):
         raise EstimateError(
             f"natural frequencies must rise, above 0 and up to half the sample rate, {nyquist_hz:g} Hz"

@@ -16,7 +16,7 @@ from chladni.spectral.frequency_response import frequency_response
 def transmissibility(
     source: CrossSpectra | TimeSeries,
     *,
-    reference: str,
+    references: str,
     responses: str | Sequence[str] | None = None,
     resolution_hz: float | None = None,
 ) -> FrequencyResponse:
@@ -26,7 +26,7 @@ def transmissibility(
     ----------
     source
         Averaged cross-spectra that hold the motions; of a series they are averaged first.
-    reference
+    references
         Name of the channel at the point where the motion comes from.
     responses
         Names of the channels it goes to; None takes every other channel in the reference's unit.
@@ -50,24 +50,24 @@ def transmissibility(
     T1 = G_ref,resp / G_ref,ref: H1 with a motion as its reference, and with the random error of H1.
     """
     spectra = source if isinstance(source, CrossSpectra) else cross_spectra(source, resolution_hz=resolution_hz)
-    unit = spectra.channels[spectra.index(reference)].unit
+    unit = spectra.channels[spectra.index(references)].unit
     if responses is None:
-        chosen = [c.name for c in spectra.channels if c.unit == unit and c.name != reference]
+        chosen = [c.name for c in spectra.channels if c.unit == unit and c.name != references]
     else:
         chosen = [responses] if isinstance(responses, str) else list(responses)
     if not chosen:
         raise EstimateError(
-            f"no channel but {reference!r} is {in_unit(unit)}; transmissibility needs two in one unit"
+            f"no channel but {references!r} is {in_unit(unit)}; transmissibility needs two in one unit"
         )
     # Checked before arithmetic: a ratio of velocity to acceleration is 1/omega in disguise.
     for name in chosen:
         other = spectra.channels[spectra.index(name)].unit
         if other != unit:
             raise EstimateError(
-                f"{name!r} is {in_unit(other)}, {reference!r} {in_unit(unit)}: transmissibility needs one unit; "
+                f"{name!r} is {in_unit(other)}, {references!r} {in_unit(unit)}: transmissibility needs one unit; "
                 "integrate or differentiate one of them, or ask for a frequency response"
             )
-    response = frequency_response(spectra, references=reference, responses=chosen)
+    response = frequency_response(spectra, references=references, responses=chosen)
     return replace(response, provenance=response.provenance.with_estimator("T1"))
 
 
@@ -93,4 +93,4 @@ def transmissibility_along(spectra: CrossSpectra, *, path: Sequence[str]) -> tup
     """
     if len(path) < 2:
         raise EstimateError(f"a path needs two channels or more, got {len(path)}")
-    return tuple(transmissibility(spectra, reference=near, responses=far) for near, far in pairwise(path))
+    return tuple(transmissibility(spectra, references=near, responses=far) for near, far in pairwise(path))

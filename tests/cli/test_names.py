@@ -104,6 +104,8 @@ def commands(path: Path, folder: Path) -> Iterator[tuple[object, ...]]:
     yield "orders", path, "--ridge", motion, "--order", 1, "--figures", folder
     yield "ods", path, "--reference", motion, "--frequency", 30, "--figures", folder
     yield "delay", path, "--reference", force, "--response", motion, "--figures", folder
+    yield "zoom", path, "--band", 10, 50, "--channel", motion, "--figures", folder
+    yield "tolerance", path, "1:1", "50:1", "--unit", "1", "--channel", motion, "--figures", folder
     yield "srs", path, "--channel", motion, "--figures", folder
     yield "frf", path, "--reference", force, "--response", motion
     yield ("modes", path, "--reference", force, "--channel", motion, "--count", 1, "--csv", folder / "m.csv",

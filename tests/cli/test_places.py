@@ -73,6 +73,8 @@ def test_standard_output_and_what_was_not_given_are_no_files(
         ["orders", "{log}", "--speed", "/x", "--setup", "{other}", "--json", "{other}"],
         ["ods", "{log}", "--reference", "/x", "--setup", "{other}", "--json", "{other}"],
         ["delay", "{log}", "--reference", "/x", "--setup", "{other}", "--json", "{other}"],
+        ["tolerance", "{log}", "1:1", "2:1", "--setup", "{other}", "--json", "{other}"],
+        ["zoom", "{log}", "--band", "1", "2", "--setup", "{other}", "--json", "{other}"],
         ["srs", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["frf", "{log}", "--reference", "/x", "--setup", "{other}", "--json", "{other}"],
         ["modes", "{log}", "--setup", "{other}", "--json", "{other}"],

@@ -24,7 +24,7 @@ def running(samples=20_000):
 @pytest.mark.parametrize("frequencies_hz", [TONES_HZ, None])
 def test_tones_have_their_amplitudes_and_phases(frequencies_hz):
     found = deflection_shapes(
-        series(running(), rate_hz=RATE_HZ), reference="a", frequencies_hz=frequencies_hz, resolution_hz=1.0
+        series(running(), rate_hz=RATE_HZ), references="a", frequencies_hz=frequencies_hz, resolution_hz=1.0
     )
     np.testing.assert_allclose(found.frequency_hz, TONES_HZ)
     np.testing.assert_allclose(np.sqrt(2) * found.values, SHAPES, rtol=1e-3)
@@ -36,7 +36,7 @@ def test_what_is_not_coherent_is_no_part_of_the_shape():
     x = running()
     x[1] += noise(1, x.shape[1], seed=5)[0] * 3
     spectra = cross_spectra(series(x, rate_hz=RATE_HZ), resolution_hz=1.0)
-    found = deflection_shapes(spectra, reference="a", frequencies_hz=[200.0])
+    found = deflection_shapes(spectra, references="a", frequencies_hz=[200.0])
     assert found.coherence[0, 1] < 0.3
     alone = np.sqrt(spectra.density[1, 1, 200].real * spectra.bandwidth_hz)
     assert abs(found.values[0, 1]) == pytest.approx(alone * np.sqrt(found.coherence[0, 1]), rel=1e-9)
@@ -47,7 +47,7 @@ def test_the_error_bar_is_the_scatter():
     x = noise(2, 64_000, seed=3)
     x[1] = x[0] + 0.5 * x[1]
     spectra = cross_spectra(series(x, rate_hz=RATE_HZ), resolution_hz=1.0, window="boxcar", overlap=0.0)
-    found = deflection_shapes(spectra, reference="a", frequencies_hz=np.arange(50.0, 450.0))
+    found = deflection_shapes(spectra, references="a", frequencies_hz=np.arange(50.0, 450.0))
     scatter = np.std(np.abs(found.values), axis=0)
     # A standard deviation of 400 trials scatters by 1/sqrt(800): three of them.
     np.testing.assert_allclose(scatter, np.sqrt(np.mean(found.std**2, axis=0)), rtol=3 / np.sqrt(800))
@@ -64,7 +64,7 @@ def test_of_whole_periods_the_error_bar_is_the_scatter_between_them():
     )
     spectra = adaptive_cross_spectra(x, references="c0")
     assert spectra.noise_density is not None
-    found = deflection_shapes(spectra, reference="c0", frequencies_hz=[40.0, 200.0, 333.0])
+    found = deflection_shapes(spectra, references="c0", frequencies_hz=[40.0, 200.0, 333.0])
     scatter = np.std(np.abs(found.values[:, 1:]), axis=1)
     # Of 3 x 60 trials: three standard deviations, 1/sqrt(360) each.
     assert scatter.mean() / found.std[:, 1:].mean() == pytest.approx(1, abs=3 / np.sqrt(360) + 0.02)
@@ -73,10 +73,10 @@ def test_of_whole_periods_the_error_bar_is_the_scatter_between_them():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"reference": "z"}, "no channel 'z'"),
-        ({"reference": "a", "frequencies_hz": [700.0]}, "700 Hz lies outside the spectrum, 0 to 500 Hz"),
-        ({"reference": "a", "frequencies_hz": []}, "no frequency is named"),
-        ({"reference": "b", "frequencies_hz": [20.0]}, "b doesn't move at 20 Hz"),
+        ({"references": "z"}, "no channel 'z'"),
+        ({"references": "a", "frequencies_hz": [700.0]}, "700 Hz lies outside the spectrum, 0 to 500 Hz"),
+        ({"references": "a", "frequencies_hz": []}, "no frequency is named"),
+        ({"references": "b", "frequencies_hz": [20.0]}, "b doesn't move at 20 Hz"),
     ],
 )
 def test_what_has_no_shape_is_refused(options, words):
@@ -87,4 +87,4 @@ def test_what_has_no_shape_is_refused(options, words):
 
 def test_noise_has_no_peak_to_take():
     with pytest.raises(EstimateError, match="name the frequencies"):
-        deflection_shapes(series(noise(2, 20_000), rate_hz=RATE_HZ), reference="a")
+        deflection_shapes(series(noise(2, 20_000), rate_hz=RATE_HZ), references="a")

@@ -27,7 +27,7 @@ def smooth_noise(samples, seed=0):
 
 def test_coefficients_are_those_of_scipy():
     x = noise(3, 500)
-    found = cross_correlation(series(x, rate_hz=RATE_HZ), reference="b", responses=["a", "c"], longest_lag_s=0.2)
+    found = cross_correlation(series(x, rate_hz=RATE_HZ), references="b", responses=["a", "c"], longest_lag_s=0.2)
     centred = x - x.mean(axis=1, keepdims=True)
     for row, other in enumerate((0, 2)):
         expected = correlate(centred[other], centred[1], method="direct")[299:700]
@@ -39,7 +39,7 @@ def test_coefficients_are_those_of_scipy():
 
 def test_a_record_is_its_own_image_at_no_lag():
     x = noise(1, 1000)[0]
-    found = cross_correlation(series(np.stack([x, -2 * x]), rate_hz=RATE_HZ), reference="a")
+    found = cross_correlation(series(np.stack([x, -2 * x]), rate_hz=RATE_HZ), references="a")
     assert found.values[0].min() == pytest.approx(-1)
     assert found.lag_s[found.values[0].argmin()] == 0
 
@@ -49,7 +49,7 @@ def test_a_record_is_its_own_image_at_no_lag():
 def test_a_delay_is_found_between_samples_within_its_error(delay_s, sign):
     x = smooth_noise(30_000)
     late = sign * delayed(x, delay_s) + 0.3 * noise(1, x.size, seed=9)[0]
-    found = time_delay(series(np.stack([x, late]), rate_hz=RATE_HZ), reference="a", longest_delay_s=0.5)
+    found = time_delay(series(np.stack([x, late]), rate_hz=RATE_HZ), references="a", longest_delay_s=0.5)
     assert found.inverted == (sign < 0,)
     assert abs(found.delay_s[0] - delay_s) < 4 * found.std_s[0]
     assert 0 < found.std_s[0] < 2e-5
@@ -60,7 +60,7 @@ def test_the_error_bar_is_the_scatter():
     x = smooth_noise(8000)
     noisy = [delayed(x, 0.01) + 0.5 * noise(1, x.size, seed=20 + trial)[0] for trial in range(40)]
     one = series(np.stack([x, *noisy]), rate_hz=RATE_HZ, names=[f"c{row}" for row in range(41)], units=["m/s^2"] * 41)
-    found = time_delay(one, reference="c0", longest_delay_s=0.05)
+    found = time_delay(one, references="c0", longest_delay_s=0.05)
     # A standard deviation of 40 trials scatters by 1/sqrt(80): three of them, and as much for the bars' own scatter.
     assert np.std(found.delay_s) / found.std_s.mean() == pytest.approx(1, abs=0.4)
 
@@ -69,9 +69,9 @@ def test_a_band_without_the_disturbance_tells_the_delay_that_the_whole_does_not(
     x = smooth_noise(30_000)
     loud = 30 * np.sin(2 * np.pi * 50 * np.arange(x.size) / RATE_HZ)
     pair = series(np.stack([x + loud, delayed(x, 0.007) + np.roll(loud, 3)]), rate_hz=RATE_HZ)
-    found = time_delay(pair, reference="a", band_hz=(100.0, 250.0), longest_delay_s=0.1)
+    found = time_delay(pair, references="a", band_hz=(100.0, 250.0), longest_delay_s=0.1)
     assert found.delay_s[0] == pytest.approx(0.007, abs=1e-5)
-    whole = time_delay(pair, reference="a", longest_delay_s=0.1)
+    whole = time_delay(pair, references="a", longest_delay_s=0.1)
     assert "the delay may be that one" in whole.notes[0]
 
 
@@ -79,7 +79,7 @@ def test_a_resonance_is_no_delay_and_is_told():
     x = smooth_noise(30_000)
     ratio = np.fft.rfftfreq(x.size, 1 / RATE_HZ) / 80
     swinging = np.fft.irfft(np.fft.rfft(x) / (1 - ratio**2 + 0.1j * ratio), x.size)
-    found = time_delay(series(np.stack([x, swinging]), rate_hz=RATE_HZ), reference="a", longest_delay_s=0.1)
+    found = time_delay(series(np.stack([x, swinging]), rate_hz=RATE_HZ), references="a", longest_delay_s=0.1)
     assert "resonances or several paths: choose a band without" in found.notes[-1]
     assert found.std_s[0] > 1e-5
 
@@ -88,19 +88,19 @@ def test_over_a_gap_nothing_is_correlated():
     x = smooth_noise(12_000)
     pair = np.stack([x, delayed(x, 0.02)])
     pair[1, 3000:3100] = np.nan
-    found = time_delay(series(pair, rate_hz=RATE_HZ), reference="a", longest_delay_s=0.1, band_hz=(10.0, 250.0))
+    found = time_delay(series(pair, rate_hz=RATE_HZ), references="a", longest_delay_s=0.1, band_hz=(10.0, 250.0))
     assert found.delay_s[0] == pytest.approx(0.02, abs=1e-6)
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"reference": "z"}, "no channel 'z'"),
-        ({"reference": "a", "responses": "a"}, "no channel but a is there"),
-        ({"reference": "a", "band_hz": (300.0, 100.0)}, "isn't one within 0 to 500 Hz"),
-        ({"reference": "a", "longest_delay_s": 60.0}, "must lie within the record, 4 s without a gap"),
-        ({"reference": "a", "longest_delay_s": 0.0}, "the longest lag is 0 s"),
-        ({"reference": "a", "responses": "c"}, "c never changes"),
+        ({"references": "z"}, "no channel 'z'"),
+        ({"references": "a", "responses": "a"}, "no channel but a is there"),
+        ({"references": "a", "band_hz": (300.0, 100.0)}, "isn't one within 0 to 500 Hz"),
+        ({"references": "a", "longest_delay_s": 60.0}, "must lie within the record, 4 s without a gap"),
+        ({"references": "a", "longest_delay_s": 0.0}, "the longest lag is 0 s"),
+        ({"references": "a", "responses": "c"}, "c never changes"),
     ],
 )
 def test_what_has_no_delay_is_refused(options, words):

@@ -47,7 +47,7 @@ def half_sine_response(natural_hz, q):
 
 @pytest.mark.parametrize("q", [10.0, 50.0])
 def test_a_half_sine_has_the_spectrum_of_the_closed_form(q):
-    found = srs(series(pulse(), rate_hz=RATE_HZ), q=q, frequency_hz=FREQUENCY_HZ)
+    found = srs(series(pulse(), rate_hz=RATE_HZ), q=q, frequencies_hz=FREQUENCY_HZ)
     truth = [half_sine_response(natural_hz, q)[1] for natural_hz in FREQUENCY_HZ]
     np.testing.assert_allclose(found.positive[0], [one.max() for one in truth], rtol=0.01)
     # Of the kick back, too, in parts of the highest response at that frequency.
@@ -60,16 +60,16 @@ def test_a_half_sine_has_the_spectrum_of_the_closed_form(q):
     ("quantity", "unit", "power"), [("relative-displacement", "m", 0), ("pseudo-velocity", "m/s", 1)]
 )
 def test_displacement_and_pseudo_velocity_are_those_of_the_closed_form(quantity, unit, power):
-    found = srs(series(pulse(), rate_hz=RATE_HZ), quantity=quantity, frequency_hz=FREQUENCY_HZ)
+    found = srs(series(pulse(), rate_hz=RATE_HZ), quantity=quantity, frequencies_hz=FREQUENCY_HZ)
     truth = [np.abs(half_sine_response(natural_hz, 10.0)[0]).max() for natural_hz in FREQUENCY_HZ]
     np.testing.assert_allclose(found.maximax[0], truth * (2 * np.pi * FREQUENCY_HZ) ** power, rtol=0.01)
     assert found.channels[0].unit == unit
 
 
 def test_slow_oscillators_tell_the_change_of_velocity_and_stiff_ones_the_peak():
-    found = srs(series(pulse(), rate_hz=RATE_HZ), q=1e6, quantity="pseudo-velocity", frequency_hz=[0.5, 1.0])
+    found = srs(series(pulse(), rate_hz=RATE_HZ), q=1e6, quantity="pseudo-velocity", frequencies_hz=[0.5, 1.0])
     np.testing.assert_allclose(found.maximax[0], HEIGHT * 2 * PULSE_S / np.pi, rtol=1e-3)
-    stiff = srs(series(pulse(), rate_hz=RATE_HZ), frequency_hz=[5000.0])
+    stiff = srs(series(pulse(), rate_hz=RATE_HZ), frequencies_hz=[5000.0])
     assert stiff.maximax[0, 0] == pytest.approx(HEIGHT, rel=0.01)
 
 
@@ -82,14 +82,14 @@ def test_at_a_high_rate_it_is_smallwoods_recursion():
     decay, turn = np.exp(-0.05 * angle), angle * np.sqrt(1 - 0.05**2)
     c, s = decay * np.cos(turn), decay * np.sin(turn) / turn
     response = lfilter([1 - s, 2 * (s - c), decay**2 - s], [1, -2 * c, decay**2], np.append(x, np.zeros(100)))
-    found = srs(series(x, rate_hz=RATE_HZ), frequency_hz=[natural_hz])
+    found = srs(series(x, rate_hz=RATE_HZ), frequencies_hz=[natural_hz])
     assert found.positive[0, 0] == pytest.approx(response.max(), rel=1e-9)
     assert found.negative[0, 0] == pytest.approx(-response.min(), rel=1e-9)
 
 
 def test_a_period_of_few_samples_is_filled_in():
     # 2 kHz sampled at 8 kHz: the half sine itself is well sampled, the oscillator isn't.
-    coarse = srs(series(pulse(rate_hz=8000.0, late_s=0.05), rate_hz=8000.0), frequency_hz=[400.0, 2000.0])
+    coarse = srs(series(pulse(rate_hz=8000.0, late_s=0.05), rate_hz=8000.0), frequencies_hz=[400.0, 2000.0])
     truth = [half_sine_response(natural_hz, 10.0)[1].max() for natural_hz in (400.0, 2000.0)]
     np.testing.assert_allclose(coarse.maximax[0], truth, rtol=0.01)
     assert "above 800 Hz" in coarse.notes[0]
@@ -106,7 +106,7 @@ def test_gravity_is_taken_off_or_kept_as_asked():
     step = srs(
         series(np.full(8000, 9.81), rate_hz=RATE_HZ),
         quantity="relative-displacement",
-        frequency_hz=[100.0],
+        frequencies_hz=[100.0],
         offset="keep",
     )
     # An oscillator overshoots a step by exp(-pi zeta / sqrt(1 - zeta^2)).
@@ -127,16 +127,16 @@ def test_lines_stand_where_those_of_every_record_stand():
 def test_nothing_is_carried_across_a_gap():
     x = np.concatenate([pulse(late_s=0.05), pulse(late_s=0.05)])
     x[3000] = np.nan
-    found = srs(series(x, rate_hz=RATE_HZ), frequency_hz=FREQUENCY_HZ)
+    found = srs(series(x, rate_hz=RATE_HZ), frequencies_hz=FREQUENCY_HZ)
     # The second pulse is whole.
-    alone = srs(series(pulse(late_s=0.05), rate_hz=RATE_HZ), frequency_hz=FREQUENCY_HZ)
+    alone = srs(series(pulse(late_s=0.05), rate_hz=RATE_HZ), frequencies_hz=FREQUENCY_HZ)
     np.testing.assert_allclose(found.maximax, alone.maximax, rtol=1e-6)
     assert "begin anew after each gap" in found.notes[0]
 
 
 def test_an_array_without_units_has_a_spectrum_of_accelerations_alone():
     bare = series(pulse(), rate_hz=RATE_HZ, units=["1"])
-    assert srs(bare, frequency_hz=[80.0]).channels[0].unit == "1"
+    assert srs(bare, frequencies_hz=[80.0]).channels[0].unit == "1"
     with pytest.raises(EstimateError, match=r"a is in 1; .* of accelerations"):
         srs(bare, quantity="pseudo-velocity")
 
@@ -146,11 +146,11 @@ def test_an_array_without_units_has_a_spectrum_of_accelerations_alone():
     [
         ({"q": 0.5}, "q is 0.5"),
         ({"q": np.inf}, "q is inf"),
-        ({"frequency_hz": [0.0, 10.0]}, "must rise, above 0"),
-        ({"frequency_hz": [20.0, 10.0]}, "must rise"),
-        ({"frequency_hz": [10_001.0]}, "half the sample rate, 10000 Hz"),
-        ({"frequency_hz": [np.nan]}, "must rise"),
-        ({"frequency_hz": [10.0], "band_hz": (1.0, 2.0)}, "give one of them"),
+        ({"frequencies_hz": [0.0, 10.0]}, "must rise, above 0"),
+        ({"frequencies_hz": [20.0, 10.0]}, "must rise"),
+        ({"frequencies_hz": [10_001.0]}, "half the sample rate, 10000 Hz"),
+        ({"frequencies_hz": [np.nan]}, "must rise"),
+        ({"frequencies_hz": [10.0], "band_hz": (1.0, 2.0)}, "give one of them"),
         ({"band_hz": (0.0, 100.0)}, "give LOW < HIGH"),
         ({"band_hz": (1.0, 100.0), "lines_an_octave": 0}, "lines an octave"),
         ({"band_hz": (1.0, 100.0), "lines_an_octave": 100_000}, "lines an octave"),
