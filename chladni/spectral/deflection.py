@@ -110,4 +110,10 @@ def _lines(spectra: CrossSpectra, frequencies_hz: Sequence[float] | None) -> Ind
     if outside.size or not wanted.size:
         told = f"{outside[0]:g} Hz lies outside" if outside.size else "no frequency is named; name some of"
         raise EstimateError(f"{told} the spectrum, {axis[0]:g} to {axis[-1]:g} Hz")
-    return np.unique([int(np.argmin(np.abs(axis - one))) for one in wanted])
+    lines = np.unique([int(np.argmin(np.abs(axis - one))) for one in wanted])
+    if axis[lines[0]] == 0:
+        # The mean is taken off: the line at 0 Hz holds no motion.
+        raise EstimateError(
+            f"{wanted.min():g} Hz lies nearer to 0 than to the first line, {axis[1]:.4g} Hz; ask for finer lines"
+        )
+    return lines

@@ -11,6 +11,7 @@ from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.filtered_series import FilteredSeries
+from chladni.signals.number_range import require_in_range
 from chladni.signals.time_series import TimeSeries
 
 Design = Literal["butterworth", "bessel"]
@@ -115,6 +116,24 @@ def measured_samples(series: TimeSeries) -> Mask:
     """``[channel, sample]``: what was measured, valid and finite."""
     finite: Mask = np.isfinite(series.values)
     return finite if series.valid is None else finite & series.valid
+
+
+def require_measured(series: TimeSeries) -> Mask:
+    """Give what was measured, see `measured_samples`, of channels that estimators can work with.
+
+    Raises
+    ------
+    EstimateError
+        When there is no channel, nothing was measured of one, or its values are too large or too small to be squared.
+    """
+    measured = measured_samples(series)
+    if not series.channels:
+        raise EstimateError("the series holds no channel; select one at least")
+    if empty := [channel.name for channel, row in zip(series.channels, measured, strict=True) if not row.any()]:
+        raise EstimateError(f"{', '.join(empty)}: nothing was measured; leave it out")
+    largest = np.max(np.abs(series.values), axis=1, initial=0.0, where=measured)
+    require_in_range(series.channels, np.asarray(largest, dtype=np.float64))
+    return measured
 
 
 def filter_runs(
@@ -224,7 +243,7 @@ def _settling_samples(sections: Real, slowest: float, *, causal: bool, at_most: 
     from scipy.signal import sosfilt
 
     # By then even poles of a high order have decayed; what isn't over in twice the record is too long for it.
-    samples = min(2 * at_most, 64 + ceil(3 * log(SETTLED**2) / log(min(slowest, 1 - 1e-12))))
+    samples = min(max(2 * at_most, 1), 64 + ceil(3 * log(SETTLED**2) / log(min(slowest, 1 - 1e-12))))
     impulse = np.zeros(samples)
     impulse[0] = 1.0
     response = np.asarray(sosfilt(sections, impulse))

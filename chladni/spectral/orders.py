@@ -9,13 +9,12 @@ import scipy.fft
 
 from chladni.signals.arrays import Complex, Mask, Real
 from chladni.signals.errors import EstimateError
-from chladni.signals.number_range import require_in_range
 from chladni.signals.order_spectra import OrderCuts, OrderMap, OrderMethod
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
 from chladni.signals.rotation import Rotation
 from chladni.signals.time_series import TimeSeries
-from chladni.spectral.filters import measured_samples
+from chladni.spectral.filters import measured_samples, require_measured
 from chladni.spectral.peaks import find_peaks
 
 # A shaft that turns back farther than that has reversed; less is noise of what tells its angle.
@@ -314,8 +313,7 @@ def _turned(series: TimeSeries, rotation: Rotation, revolutions: float, overlap:
         raise EstimateError(f"a window of {revolutions:g} revolutions; give a number above 0, such as 10")
     if not 0 <= overlap < 1:
         raise EstimateError(f"overlap is {overlap:g}; it must be at least 0 and below 1")
-    measured = measured_samples(series)
-    require_in_range(series.channels, np.max(np.abs(series.values), axis=1, initial=0.0, where=measured))
+    require_measured(series)
     angle = rotation.at(series)
     known = np.isfinite(angle)
     # Of a shaft at rest the angle is noise, which no window may run backwards over.

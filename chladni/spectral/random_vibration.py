@@ -10,7 +10,7 @@ from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.random_vibration import ProbabilityDensity, ProfileCheck, RandomProfile, VibrationResponse
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import si_factor
-from chladni.spectral.filters import measured_samples
+from chladni.spectral.filters import require_measured
 
 # Points of the integral over a resonance: steps of so many a half-power bandwidth, within so many of them.
 STEPS_A_BANDWIDTH, BANDWIDTHS = 20, 20
@@ -152,7 +152,7 @@ def probability_density(series: TimeSeries, *, bins: int = 60, widest: float = 5
         raise EstimateError(f"{bins} bins to {widest:g} standard deviations; give 2 or more, above 0")
     edges = np.linspace(-widest, widest, bins + 1)
     rows = []
-    for channel, values, known in zip(series.channels, series.values, measured_samples(series), strict=True):
+    for channel, values, known in zip(series.channels, series.values, require_measured(series), strict=True):
         x = values[known].astype(np.float64)
         size = float(x.std()) if x.size else 0.0
         if not size > 0:

@@ -108,6 +108,11 @@ def _from_pulses(series: TimeSeries, pulses_a_revolution: float, threshold: floa
     when_s = (edges - 1 + (level - before) / (after - before)) / series.sample_rate_hz
     counts, lost = _counted(np.diff(when_s))
     notes = []
+    if counts.sum() - counts.size > counts.size:
+        raise EstimateError(
+            f"{name}: more pulses seem to be missing than the {edges.size} that are there; name a channel of pulses, "
+            "or give the threshold that they pass"
+        )
     if lost.size:
         first_s = float(when_s[lost[0]])
         notes.append(
@@ -199,6 +204,8 @@ def _from_ridge(
     lines = lines[lines > 0]
     if lines.size < 2:
         raise EstimateError(f"no line lies between {low_hz:g} and {high_hz:g} Hz; give LOW < HIGH of the ridge")
+    if not spectra.values[0][:, lines].any():
+        raise EstimateError(f"{series.channels[0].name} doesn't move between {low_hz:g} and {high_hz:g} Hz")
     path = lines[_strongest_path(np.log(np.maximum(spectra.values[0][:, lines], np.finfo(np.float32).tiny)))]
     times_s = series.times_s()
     ridge_hz = np.interp(times_s, spectra.time_s, spectra.frequency_hz[path])

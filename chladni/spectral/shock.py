@@ -9,11 +9,10 @@ import numpy as np
 
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.errors import EstimateError
-from chladni.signals.number_range import require_in_range
 from chladni.signals.shock_response import ShockQuantity, ShockResponse
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import integrated
-from chladni.spectral.filters import channel_runs, measured_samples
+from chladni.spectral.filters import channel_runs, require_measured
 
 Offset = Literal["first", "median", "keep"]
 
@@ -94,10 +93,7 @@ def srs(
     _require_accelerations(series, quantity)
     if not 0.5 < q < np.inf:
         raise EstimateError(f"q is {q:g}; it must be finite and above 0.5, such as 10 for 5 % damping")
-    measured = measured_samples(series)
-    if empty := [channel.name for channel, row in zip(series.channels, measured, strict=True) if not row.any()]:
-        raise EstimateError(f"{', '.join(empty)}: nothing was measured; leave it out")
-    require_in_range(series.channels, np.max(np.abs(series.values), axis=1, initial=0.0, where=measured))
+    measured = require_measured(series)
     lines_hz = _lines(series, measured, band_hz, lines_an_octave, frequencies_hz)
     bank = _Bank(lines_hz=lines_hz, rate_hz=series.sample_rate_hz, q=q, quantity=quantity)
     rows = [_of_channel(bank, values, mask, offset) for values, mask in zip(series.values, measured, strict=True)]
@@ -202,6 +198,8 @@ def _ladder(series: TimeSeries, measured: Mask, band_hz: tuple[float, float] | N
         # Slower oscillators see no more of the shock than its change of velocity.
         longest = max(last - first for row in measured for first, last in channel_runs(row))
         band_hz = (series.sample_rate_hz / longest, series.sample_rate_hz / RATE_OVER_HIGHEST)
+        if longest <= RATE_OVER_HIGHEST:
+            raise EstimateError(f"{longest} samples without a gap are too few for a spectrum; read more")
     low_hz, high_hz = band_hz
     if not 0 < low_hz < high_hz < np.inf:
         raise EstimateError(f"a band from {low_hz:g} to {high_hz:g} Hz holds no natural frequency; give LOW < HIGH")

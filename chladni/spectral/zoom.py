@@ -3,11 +3,10 @@
 import numpy as np
 
 from chladni.signals.errors import EstimateError
-from chladni.signals.number_range import require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum, Quantity
-from chladni.spectral.filters import channel_runs, measured_samples
+from chladni.spectral.filters import channel_runs, require_measured
 from chladni.spectral.windows import Window, noise_bandwidth_bins, window_name, window_samples
 
 MOST_LINES = 1_000_000
@@ -70,13 +69,14 @@ def zoom_spectrum(
         )
     if not 2 <= lines <= MOST_LINES:
         raise EstimateError(f"{lines} lines; give 2 to {MOST_LINES}")
-    runs = list(channel_runs(np.logical_and.reduce(measured_samples(series), axis=0)))
+    runs = list(channel_runs(np.logical_and.reduce(require_measured(series), axis=0)))
     if not runs:
         raise EstimateError("no sample was measured in all channels at once")
     first, last = max(runs, key=lambda run: run[1] - run[0])
     values = series.values[:, first:last].astype(np.float64)
-    require_in_range(series.channels, np.abs(values).max(axis=1))
     shape = window_samples(window, last - first)
+    if not shape.sum() > 0:
+        raise EstimateError(f"{last - first} samples without a gap are too few for a spectrum; read more")
     weighted = (values - values.mean(axis=1, keepdims=True)) * shape
     spectrum = zoom_fft(weighted, [low_hz, high_hz], lines, fs=series.sample_rate_hz, endpoint=True)
     gain = 2 / shape.sum() / (1 if quantity == "peak" else np.sqrt(2))

@@ -77,6 +77,7 @@ def test_of_whole_periods_the_error_bar_is_the_scatter_between_them():
         ({"references": "a", "frequencies_hz": [700.0]}, "700 Hz lies outside the spectrum, 0 to 500 Hz"),
         ({"references": "a", "frequencies_hz": []}, "no frequency is named"),
         ({"references": "b", "frequencies_hz": [20.0]}, "b doesn't move at 20 Hz"),
+        ({"references": "a", "frequencies_hz": [0.3]}, "0.3 Hz lies nearer to 0 than to the first line, 1 Hz"),
     ],
 )
 def test_what_has_no_shape_is_refused(options, words):

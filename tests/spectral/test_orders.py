@@ -177,6 +177,11 @@ def test_a_lost_pulse_is_counted_and_told():
     assert "1 times a pulse is missing, first at 3.9" in found.notes[0]
 
 
+def test_noise_is_no_train_of_pulses():
+    with pytest.raises(EstimateError, match=r"more pulses seem to be missing than the .* that are there"):
+        rotation(series(np.random.default_rng(1).standard_normal(4000), rate_hz=RATE_HZ), tacho="a")
+
+
 def test_noise_on_an_edge_is_no_pulse():
     t = np.arange(20_000) / RATE_HZ
     noisy = np.sin(2 * np.pi * 5 * t) + 0.05 * np.random.default_rng(1).standard_normal(t.size)

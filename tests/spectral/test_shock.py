@@ -162,6 +162,13 @@ def test_what_has_no_spectrum_is_refused(options, words):
         srs(series(pulse(), rate_hz=RATE_HZ), **options)
 
 
+def test_a_series_of_nothing_or_of_little_is_refused():
+    with pytest.raises(EstimateError, match="holds no channel"):
+        srs(series(np.zeros((1, 100)), rate_hz=RATE_HZ).select([]))
+    with pytest.raises(EstimateError, match="3 samples without a gap are too few"):
+        srs(series(np.zeros(3), rate_hz=RATE_HZ))
+
+
 def test_a_force_and_an_empty_channel_are_refused_by_name():
     with pytest.raises(EstimateError, match="a is in N; a shock response spectrum is of accelerations"):
         srs(series(pulse(), rate_hz=RATE_HZ, units=["N"]))
