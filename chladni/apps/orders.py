@@ -72,7 +72,7 @@ def track_orders(
         turned = rotation(told, **({telling: name} | how))
         # A ridge is a vibration itself.
         series = _tracked(log, channels, () if turned.source == "ridge" else (name,), span)
-        window = {} if revolutions is None else {"revolutions": revolutions}
+        window: dict[str, Any] = {} if revolutions is None else {"revolutions": revolutions}
         maps = tuple(order_map(one, turned, highest_order=highest_order, **window) for one in series)
         wanted = strongest_orders(maps, count=ORDERS_TOLD) if orders is None else orders
         cuts = tuple(order_cuts(one, turned, orders=wanted, method=method, **window) for one in series)

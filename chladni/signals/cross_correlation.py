@@ -1,6 +1,7 @@
 """How alike two records are when one is shifted, and by how much one is late."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
@@ -22,6 +23,9 @@ class CrossCorrelation(Value):
     reference
         The channel that they are held against.
     """
+
+    AXES: ClassVar = {"values": ("responses", "lag_s")}
+    ROWS: ClassVar = "lag_s"
 
     lag_s: Real
     values: Real
@@ -59,6 +63,9 @@ class TimeDelays(Value):
     notes
         What to distrust.
     """
+
+    AXES: ClassVar = {"delay_s": ("responses",), "std_s": ("responses",), "coherence": ("responses",)}
+    ROWS: ClassVar = "responses"
 
     delay_s: Real
     std_s: Real

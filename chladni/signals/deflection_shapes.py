@@ -1,6 +1,7 @@
 """Operating deflection shapes: how all points move together at one frequency, as the machine runs."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -36,6 +37,13 @@ class DeflectionShapes(Value):
         How it was made.
     """
 
+    AXES: ClassVar = {
+        "values": ("frequency_hz", "channels"),
+        "std": ("frequency_hz", "channels"),
+        "coherence": ("frequency_hz", "channels"),
+    }
+    ROWS: ClassVar = "frequency_hz"
+
     frequency_hz: Real
     values: Complex
     std: Real
@@ -52,3 +60,7 @@ class DeflectionShapes(Value):
         for name in ("values", "std", "coherence"):
             require_shape(name, getattr(self, name), expected, "shapes x channels")
         self._freeze()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:
+        """Give the unit of a channel's motion."""
+        return "" if field == "coherence" else self.channels[place[0]].unit

@@ -1,7 +1,7 @@
 """Vibration by order: in multiples of a shaft's speed of rotation."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -38,6 +38,9 @@ class OrderMap(Value):
         What to know of how it was made.
     """
 
+    AXES: ClassVar = {"values": ("channels", "time_s", "order"), "speed_hz": ("time_s",)}
+    ROWS: ClassVar = "time_s"
+
     order: Real
     time_s: Real
     speed_hz: Real
@@ -54,6 +57,10 @@ class OrderMap(Value):
         expected = (len(self.channels), self.time_s.size, self.order.size)
         require_shape("values", self.values, expected, "channels x slices x orders")
         self._freeze()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:
+        """Give the unit of a channel's amplitudes, or of the speed."""
+        return self.channels[place[0]].unit if field == "values" else "Hz"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,6 +88,9 @@ class OrderCuts(Value):
         What to know of how they were made.
     """
 
+    AXES: ClassVar = {"values": ("channels", "orders", "time_s"), "speed_hz": ("time_s",)}
+    ROWS: ClassVar = "time_s"
+
     orders: Real
     time_s: Real
     speed_hz: Real
@@ -95,3 +105,7 @@ class OrderCuts(Value):
         expected = (len(self.channels), self.orders.size, self.time_s.size)
         require_shape("values", self.values, expected, "channels x orders x points")
         self._freeze()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:
+        """Give the unit of a channel's amplitudes, or of the speed."""
+        return self.channels[place[0]].unit if field == "values" else "Hz"

@@ -1,12 +1,14 @@
 """Values of random vibration tests: a profile, how a spectrum keeps it, how amplitudes are spread, what they do."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
+from chladni.signals.units import power_density_unit
 from chladni.signals.value import Value, require_frequency_axis, require_shape
 
 
@@ -32,6 +34,9 @@ class RandomProfile(Value):
     1.0
     """
 
+    AXES: ClassVar = {"density": ("frequency_hz",)}
+    ROWS: ClassVar = "frequency_hz"
+
     frequency_hz: Real
     density: Real
     unit: str
@@ -50,6 +55,10 @@ class RandomProfile(Value):
                 f"a tolerance of +{self.upper_db:g} and -{self.lower_db:g} dB; both must be 0 or more"
             )
         self._freeze()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of the densities."""
+        return power_density_unit(self.unit)
 
     def at(self, frequency_hz: Real) -> Real:
         """Density at each frequency; NaN outside the breakpoints."""
@@ -91,6 +100,9 @@ class ProfileCheck(Value):
         What was asked for.
     """
 
+    AXES: ClassVar = {"deviation_db": ("channels", "frequency_hz")}
+    ROWS: ClassVar = "frequency_hz"
+
     frequency_hz: Real
     deviation_db: Real
     outside: Real
@@ -107,6 +119,10 @@ class ProfileCheck(Value):
         for name in ("outside", "rms", "std_db"):
             require_shape(name, getattr(self, name), expected[:1], "channels")
         self._freeze()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of the deviations."""
+        return "dB"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -126,6 +142,9 @@ class ProbabilityDensity(Value):
     channels
         One for each row.
     """
+
+    AXES: ClassVar = {"density": ("channels", "deviation"), "std": ("channels", "deviation")}
+    ROWS: ClassVar = "deviation"
 
     deviation: Real
     density: Real
@@ -170,6 +189,13 @@ class VibrationResponse(Value):
         One for each row.
     """
 
+    AXES: ClassVar = {
+        "peak": ("channels", "frequency_hz"),
+        "rms": ("channels", "frequency_hz"),
+        "miles": ("channels", "frequency_hz"),
+    }
+    ROWS: ClassVar = "frequency_hz"
+
     frequency_hz: Real
     rms: Real
     miles: Real
@@ -185,3 +211,7 @@ class VibrationResponse(Value):
         for name in ("rms", "miles", "peak"):
             require_shape(name, getattr(self, name), expected, "channels x frequencies")
         self._freeze()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a channel's response."""
+        return self.channels[place[0]].unit

@@ -1,7 +1,7 @@
 """How far a shaft has turned."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -30,6 +30,9 @@ class Rotation(Value):
     notes
         What to know of how it was made.
     """
+
+    AXES: ClassVar = {"revolutions": ("time_s",)}
+    ROWS: ClassVar = "time_s"
 
     time_s: Real
     revolutions: Real

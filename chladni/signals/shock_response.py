@@ -1,7 +1,7 @@
 """Shock response spectra: how far a shock drives oscillators of every frequency."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -35,6 +35,13 @@ class ShockResponse(Value):
         What to know of how it was made.
     """
 
+    AXES: ClassVar = {
+        "maximax": ("channels", "frequency_hz"),
+        "positive": ("channels", "frequency_hz"),
+        "negative": ("channels", "frequency_hz"),
+    }
+    ROWS: ClassVar = "frequency_hz"
+
     frequency_hz: Real
     positive: Real
     negative: Real
@@ -53,6 +60,10 @@ class ShockResponse(Value):
         require_shape("negative", self.negative, expected, "channels x frequencies")
         require_shape("offset", self.offset, expected[:1], "channels")
         self._freeze()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a channel's response."""
+        return self.channels[place[0]].unit
 
     @property
     def maximax(self) -> Real:

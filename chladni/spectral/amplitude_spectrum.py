@@ -1,7 +1,7 @@
 """Amplitude spectra from averaged cross-spectra."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -38,6 +38,9 @@ class AmplitudeSpectrum(Value):
         How it was made.
     """
 
+    AXES: ClassVar = {"values": ("channels", "frequency_hz"), "std": ("channels", "frequency_hz")}
+    ROWS: ClassVar = "frequency_hz"
+
     frequency_hz: Real
     values: Real
     std: Real
@@ -51,6 +54,10 @@ class AmplitudeSpectrum(Value):
         require_shape("values", self.values, expected, "channels x frequencies")
         require_shape("std", self.std, expected, "channels x frequencies")
         self._freeze()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a channel's amplitudes."""
+        return self.channels[place[0]].unit
 
 
 def amplitude_spectrum(spectra: CrossSpectra, *, quantity: Quantity = "rms") -> AmplitudeSpectrum:

@@ -4,35 +4,41 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from chladni.io.source import SeriesLike
 from chladni.signals.arrays import Complex, Index, Real
+from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.deflection_shapes import DeflectionShapes
 from chladni.signals.errors import EstimateError
-from chladni.signals.time_series import TimeSeries
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.peaks import find_peaks
 from chladni.spectral.power_spectral_density import power_spectral_density
 
 
 def deflection_shapes(
-    source: CrossSpectra | TimeSeries,
+    source: CrossSpectra | SeriesLike,
     *,
     references: str,
     frequencies_hz: Sequence[float] | None = None,
     resolution_hz: float | None = None,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> DeflectionShapes:
     """Tell how all points move together at chosen frequencies while the machine runs.
 
     Parameters
     ----------
     source
-        Averaged cross-spectra of all points measured at once; of a series they are averaged first.
+        Averaged cross-spectra of all points measured at once; or a log, the path to one, a series or an array
+        ``[channel, sample]``, whose cross-spectra are averaged after Welch first.
     references
         Name of the channel whose phase is 0; one that moves at every frequency asked for.
     frequencies_hz
         Where; the nearest line is taken. None takes the named peaks of all channels.
-    resolution_hz
-        Of a series, distance of the lines.
+    resolution_hz, channels, sample_rate_hz, start_s, end_s
+        Of samples: how they are averaged, see `cross_spectra`.
 
     Returns
     -------
@@ -53,18 +59,23 @@ def deflection_shapes(
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
     >>> turn = 2 * np.pi * 20 * np.arange(8000) / 1000
-    >>> x = TimeSeries(
-    ...     values=np.stack([np.cos(turn), 3 * np.cos(turn - np.pi / 2)]),
-    ...     sample_rate_hz=1000.0,
-    ...     channels=(Channel(name="base", unit="m/s^2"), Channel(name="tip", unit="m/s^2")),
-    ... )
-    >>> shape = deflection_shapes(x, references="base", frequencies_hz=[20.0], resolution_hz=1.0)
+    >>> x = {"base": np.cos(turn), "tip": 3 * np.cos(turn - np.pi / 2)}
+    >>> shape = deflection_shapes(x, references="base", frequencies_hz=[20], resolution_hz=1, sample_rate_hz=1000)
     >>> [round(float(part), 3) for part in (abs(shape.values[0, 1]) * 2**0.5, np.angle(shape.values[0, 1], deg=True))]
     [3.0, -90.0]
     """
-    spectra = source if isinstance(source, CrossSpectra) else cross_spectra(source, resolution_hz=resolution_hz)
+    if isinstance(source, CrossSpectra):
+        spectra = source
+    else:
+        spectra = cross_spectra(
+            source,
+            channels=None if channels is None else dict.fromkeys((references, *as_names(channels))),
+            resolution_hz=resolution_hz,
+            sample_rate_hz=sample_rate_hz,
+            start_s=start_s,
+            end_s=end_s,
+        )
     row = spectra.index(references)
     lines = _lines(spectra, frequencies_hz)
     own = spectra.density[row, row, lines].real

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.io.source import SeriesLike, series_of
 from chladni.signals.arrays import Real
-from chladni.signals.channel import find_channels
+from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_correlation import CrossCorrelation, TimeDelays
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import require_in_range
@@ -31,24 +32,30 @@ class _Delay:
 
 
 def cross_correlation(
-    series: TimeSeries,
+    source: SeriesLike,
     *,
     references: str,
-    responses: str | Sequence[str] | None = None,
+    responses: Names | None = None,
     longest_lag_s: float | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> CrossCorrelation:
     """Correlate channels with a reference over lag.
 
     Parameters
     ----------
-    series
-        Channels on one clock; their means are taken off.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        channels on one clock; their means are taken off.
     references
         Name of the channel that the others are held against.
     responses
         Names of the others; None for all.
     longest_lag_s
         Lags from minus to plus this; by default half the record.
+    sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -67,18 +74,13 @@ def cross_correlation(
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
     >>> x = np.random.default_rng(1).standard_normal(1000)
-    >>> pair = TimeSeries(
-    ...     values=np.stack([x, np.roll(x, 30)]),
-    ...     sample_rate_hz=100.0,
-    ...     channels=(Channel(name="a"), Channel(name="b")),
-    ... )
-    >>> found = cross_correlation(pair, references="a", longest_lag_s=1.0)
+    >>> pair = {"a": x, "b": np.roll(x, 30)}
+    >>> found = cross_correlation(pair, references="a", longest_lag_s=1.0, sample_rate_hz=100.0)
     >>> float(found.lag_s[found.values[0].argmax()])
     0.3
     """
-    chosen = _chosen(series, references, responses)
+    chosen = _chosen(source, references, responses, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     values = _whole_run(chosen)
     longest = values.shape[1] // 2 if longest_lag_s is None else round(longest_lag_s * chosen.sample_rate_hz)
     if not 0 < longest < values.shape[1]:
@@ -91,20 +93,24 @@ def cross_correlation(
 
 
 def time_delay(
-    series: TimeSeries,
+    source: SeriesLike,
     *,
     references: str,
-    responses: str | Sequence[str] | None = None,
+    responses: Names | None = None,
     band_hz: tuple[float, float] | None = None,
     longest_delay_s: float | None = None,
     resolution_hz: float | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> TimeDelays:
     """Tell by how much channels come after a reference.
 
     Parameters
     ----------
-    series
-        Channels on one clock.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        channels on one clock.
     references, responses
         As for `cross_correlation`.
     band_hz
@@ -114,6 +120,8 @@ def time_delay(
         Between minus and plus this the delay is looked for; by default a tenth of the record.
     resolution_hz
         Distance of the lines on which the phase is fitted, see `cross_spectra`.
+    sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -133,7 +141,7 @@ def time_delay(
     ASSP 24(4); Bendat & Piersol 2010, eq. 9.52). A note tells when another peak is nearly as high, or when phases
     lie farther off the line than their scatter explains.
     """
-    chosen = _chosen(series, references, responses)
+    chosen = _chosen(source, references, responses, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     nyquist_hz = chosen.sample_rate_hz / 2
     low_hz, high_hz = (0.0, nyquist_hz) if band_hz is None else band_hz
     if not 0 <= low_hz < high_hz <= nyquist_hz:
@@ -165,14 +173,12 @@ def time_delay(
     )
 
 
-def _chosen(series: TimeSeries, reference: str, responses: str | Sequence[str] | None) -> TimeSeries:
+def _chosen(source: SeriesLike, reference: str, responses: Names | None, **part: float | None) -> TimeSeries:
+    """Give the reference and its responses, in this order."""
+    named = None if responses is None else tuple(dict.fromkeys((reference, *as_names(responses))))
+    series = series_of(source, channels=named, **part)
     first = series.channels[series.index(reference)].name
-    if responses is None:
-        others = [channel.name for channel in series.channels]
-    else:
-        wanted = [responses] if isinstance(responses, str) else list(responses)
-        others = [series.channels[row].name for row in find_channels(series.channels, wanted)]
-    others = [name for name in dict.fromkeys(others) if name != first]
+    others = [channel.name for channel in series.channels if channel.name != first]
     if not others:
         raise EstimateError(f"no channel but {first} is there; a second one is needed")
     return series.select([first, *others])

@@ -7,8 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from chladni.io.source import SeriesLike, series_of
 from chladni.signals.arrays import Mask, Real
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.filtered_series import FilteredSeries
 from chladni.signals.number_range import require_in_range
@@ -22,44 +23,66 @@ SETTLED = 0.01
 
 
 def lowpass(
-    series: TimeSeries, *, high_hz: float, order: int = 4, design: Design = "butterworth", causal: bool = False
+    source: SeriesLike,
+    *,
+    high_hz: float,
+    order: int = 4,
+    design: Design = "butterworth",
+    causal: bool = False,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> FilteredSeries:
     """Let frequencies up to `high_hz` pass; see `bandpass`.
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
     >>> t = np.arange(4000) / 1000
-    >>> two = np.sin(2 * np.pi * 5 * t) + np.sin(2 * np.pi * 200 * t)
-    >>> x = TimeSeries(values=two[None], sample_rate_hz=1000.0, channels=(Channel(name="a"),))
-    >>> y = lowpass(x, high_hz=30.0)
+    >>> y = lowpass(np.sin(2 * np.pi * 5 * t) + np.sin(2 * np.pi * 200 * t), high_hz=30.0, sample_rate_hz=1000.0)
     >>> bool(np.allclose(y.series.values[0, 500:-500], np.sin(2 * np.pi * 5 * t)[500:-500], atol=1e-3))
     True
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     return _filtered(series, "lowpass", (high_hz,), order=order, design=design, causal=causal)
 
 
 def highpass(
-    series: TimeSeries, *, low_hz: float, order: int = 4, design: Design = "butterworth", causal: bool = False
+    source: SeriesLike,
+    *,
+    low_hz: float,
+    order: int = 4,
+    design: Design = "butterworth",
+    causal: bool = False,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> FilteredSeries:
     """Let frequencies from `low_hz` upwards pass, without the mean; see `bandpass`."""
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     return _filtered(series, "highpass", (low_hz,), order=order, design=design, causal=causal)
 
 
 def bandpass(
-    series: TimeSeries,
+    source: SeriesLike,
     *,
     band_hz: tuple[float, float],
     order: int = 4,
     design: Design = "butterworth",
     causal: bool = False,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> FilteredSeries:
     """Let a band pass.
 
     Parameters
     ----------
-    series
-        Samples, of any unit.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        samples, of any unit.
     band_hz
         Corners, between 0 and half the sample rate.
     order
@@ -70,6 +93,8 @@ def bandpass(
     causal
         False filters forwards and backwards: no phase shift, but 6 dB down at the corners, twice the slope, and
         what comes announces itself. True filters forwards, as an analogue filter would, with its delay.
+    channels, sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -91,18 +116,24 @@ def bandpass(
     over what is left is 1 % of the whole: the most that samples before the run, no larger than those in it, can
     matter.
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     return _filtered(series, "bandpass", band_hz, order=order, design=design, causal=causal)
 
 
 def bandstop(
-    series: TimeSeries,
+    source: SeriesLike,
     *,
     band_hz: tuple[float, float],
     order: int = 4,
     design: Design = "butterworth",
     causal: bool = False,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> FilteredSeries:
     """Stop a band, such as 49 to 51 Hz, and let the rest pass; see `bandpass`."""
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     return _filtered(series, "bandstop", band_hz, order=order, design=design, causal=causal)
 
 

@@ -8,7 +8,9 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from chladni.io.source import SeriesLike, series_of
 from chladni.signals.arrays import Real
+from chladni.signals.channel import Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.filtered_series import FilteredSeries
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -23,18 +25,30 @@ EDGE_PERIODS = 3.0
 Gain = Callable[[Real], NDArray[np.complexfloating]]
 
 
-def integrate(series: TimeSeries, *, low_hz: float, times: int = 1) -> FilteredSeries:
+def integrate(
+    source: SeriesLike,
+    *,
+    low_hz: float,
+    times: int = 1,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> FilteredSeries:
     """Integrate motions over time: acceleration to velocity, twice to displacement.
 
     Parameters
     ----------
-    series
-        Motions, such as m/s^2; `TimeSeries.select` them first.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        motions, such as m/s^2.
     low_hz
         Lowest frequency that passes unchanged, above 0: the slow drift of a sensor would otherwise outgrow the motion
         as 1/omega. Between ``low_hz / 2`` and `low_hz` the gain falls to zero along a raised cosine.
     times
         How often to integrate, at least 1.
+    channels, sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -55,6 +69,7 @@ def integrate(series: TimeSeries, *, low_hz: float, times: int = 1) -> FilteredS
     by (omega dt)^2 / 12. What lies beyond the ends is unknown: of a tone of frequency f, integrated n times, the ends
     leave a drift near `low_hz`, at ``edges_s`` up to 1.5 % of the tone's result times (f / low_hz)^(n - 1).
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     _require_times(times)
     nyquist_hz = series.sample_rate_hz / 2
     if not 0 < low_hz < nyquist_hz:
@@ -79,18 +94,30 @@ def integrate(series: TimeSeries, *, low_hz: float, times: int = 1) -> FilteredS
     return _converted(series, run, times=-times, band_hz=(low_hz, nyquist_hz), edge_s=edge_s, notes=(note,))
 
 
-def differentiate(series: TimeSeries, *, high_hz: float | None = None, times: int = 1) -> FilteredSeries:
+def differentiate(
+    source: SeriesLike,
+    *,
+    high_hz: float | None = None,
+    times: int = 1,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> FilteredSeries:
     """Differentiate motions over time: displacement to velocity, twice to acceleration.
 
     Parameters
     ----------
-    series
-        Motions, such as m.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        motions, such as m.
     high_hz
         Highest frequency that passes unchanged, default 80 % of half the sample rate: noise grows as omega. Above it
         the gain falls to zero at half the sample rate along a raised cosine.
     times
         How often to differentiate, at least 1.
+    channels, sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -104,6 +131,7 @@ def differentiate(series: TimeSeries, *, high_hz: float | None = None, times: in
     SetupError
         When a unit has no derivative, such as N.
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     _require_times(times)
     nyquist_hz = series.sample_rate_hz / 2
     high_hz = 0.8 * nyquist_hz if high_hz is None else high_hz

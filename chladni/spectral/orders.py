@@ -7,7 +7,9 @@ from typing import Final
 import numpy as np
 import scipy.fft
 
+from chladni.io.source import SeriesLike, series_of
 from chladni.signals.arrays import Complex, Mask, Real
+from chladni.signals.channel import Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.order_spectra import OrderCuts, OrderMap, OrderMethod
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -89,19 +91,24 @@ class _Window:
 
 
 def order_map(
-    series: TimeSeries,
+    source: SeriesLike,
     rotation: Rotation,
     *,
     highest_order: float | None = None,
     revolutions: float = 10.0,
     overlap: float = 0.5,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> OrderMap:
     """Give amplitudes over order and time.
 
     Parameters
     ----------
-    series
-        Vibration; the rotation may have another clock rate.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        vibration; the rotation may have another clock rate.
     rotation
         From `chladni.rotation`.
     highest_order
@@ -110,6 +117,8 @@ def order_map(
         Length of a slice; orders closer than 2/revolutions run together.
     overlap
         Share of a slice that the next one repeats, 0 <= overlap < 1.
+    channels, sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -127,6 +136,7 @@ def order_map(
     Computed order tracking (Fyfe & Munck 1997, Mechanical Systems and Signal Processing 11(2)): each slice is
     resampled at equal steps of angle, fine enough that nothing aliases, weighted by a Hann window and transformed.
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     turned = _turned(series, rotation, revolutions, overlap)
     windows = turned.windows(revolutions, overlap)
     fastest_hz = max(window.speed_hz for window in windows)
@@ -162,13 +172,17 @@ def order_map(
 
 
 def order_cuts(
-    series: TimeSeries,
+    source: SeriesLike,
     rotation: Rotation,
     *,
     orders: Sequence[float] = (1.0,),
     method: OrderMethod = "angle",
     revolutions: float = 8.0,
     overlap: float = 0.75,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> OrderCuts:
     """Give amplitude and phase of single orders over time and speed.
 
@@ -186,6 +200,8 @@ def order_cuts(
         averaged. The band of ``vold-kalman`` is as wide as that of such a window, 1.44/revolutions orders 3 dB down.
     overlap
         Share of a window that the next one repeats.
+    channels, sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -208,18 +224,15 @@ def order_cuts(
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
     >>> t = np.arange(20_000) / 1000
-    >>> x = TimeSeries(
-    ...     values=3 * np.cos(2 * np.pi * 2 * (10 * t + t**2) + 0.5)[None],
-    ...     sample_rate_hz=1000.0,
-    ...     channels=(Channel(name="a"),),
-    ... )
-    >>> turned = Rotation(time_s=t, revolutions=10 * t + t**2, start_time_ns=0, source="phase")
-    >>> second = order_cuts(x, turned, orders=[2.0]).values[0, 0]
+    >>> angle = 10 * t + t**2
+    >>> turned = Rotation(time_s=t, revolutions=angle, start_time_ns=0, source="phase")
+    >>> cuts = order_cuts(3 * np.cos(2 * np.pi * 2 * angle + 0.5), turned, orders=[2.0], sample_rate_hz=1000.0)
+    >>> second = cuts.values[0, 0]
     >>> [round(float(part), 2) for part in (abs(second[7]), np.angle(second[7]))]
     [3.0, 0.5]
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     wanted = np.atleast_1d(np.asarray(orders, dtype=np.float64))
     if not (
         wanted.size and np.all(wanted > 0) and np.all(np.isfinite(wanted)) and np.unique(wanted).size == wanted.size

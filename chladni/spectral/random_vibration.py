@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from chladni.io.source import SeriesLike, density_of, series_of
 from chladni.signals.arrays import Real
+from chladni.signals.channel import Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.random_vibration import ProbabilityDensity, ProfileCheck, RandomProfile, VibrationResponse
-from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import si_factor
 from chladni.spectral.filters import require_measured
 
@@ -69,7 +71,8 @@ def check_profile(density: PowerSpectralDensity, profile: RandomProfile) -> Prof
     Parameters
     ----------
     density
-        Of channels in the profile's unit; lines outside the profile are left out.
+        Of channels in the profile's unit, such as `PowerSpectralDensity.from_arrays` makes of an array; lines outside
+        the profile are left out.
     profile
         From `random_profile`.
 
@@ -112,17 +115,29 @@ def check_profile(density: PowerSpectralDensity, profile: RandomProfile) -> Prof
     )
 
 
-def probability_density(series: TimeSeries, *, bins: int = 60, widest: float = 5.0) -> ProbabilityDensity:
+def probability_density(
+    source: SeriesLike,
+    *,
+    bins: int = 60,
+    widest: float = 5.0,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> ProbabilityDensity:
     """Tell how often amplitudes occur, beside what Gaussian noise has.
 
     Parameters
     ----------
-    series
-        Of all channels.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        of all channels.
     bins
         How many, at least 2.
     widest
         From minus to plus so many standard deviations; what lies beyond isn't counted.
+    channels, sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -142,12 +157,11 @@ def probability_density(series: TimeSeries, *, bins: int = 60, widest: float = 5
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
-    >>> noise = np.random.default_rng(1).standard_normal((1, 100_000))
-    >>> found = probability_density(TimeSeries(values=noise, sample_rate_hz=1e3, channels=(Channel(name="a"),)))
+    >>> found = probability_density(np.random.default_rng(1).standard_normal(100_000), sample_rate_hz=1000.0)
     >>> bool(np.abs(found.density[0] - found.gaussian).max() < 0.02)
     True
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     if not (bins >= 2 and 0 < widest < np.inf):
         raise EstimateError(f"{bins} bins to {widest:g} standard deviations; give 2 or more, above 0")
     edges = np.linspace(-widest, widest, bins + 1)
@@ -180,19 +194,21 @@ def _held_together(deviation: Real) -> float:
 
 
 def vibration_response(
-    density: PowerSpectralDensity,
+    source: PowerSpectralDensity | ArrayLike,
     *,
     frequencies_hz: Real | Sequence[float],
     q: float = 10.0,
     duration_s: float = 60.0,
     probability: float = 0.5,
+    frequency_hz: ArrayLike | None = None,
 ) -> VibrationResponse:
     """Give the shock response spectrum of a random vibration: RMS and peak of oscillators on that base.
 
     Parameters
     ----------
-    density
-        Of base accelerations; straight between its lines on logarithmic axes, nothing outside them.
+    source
+        Densities of base accelerations, or an array ``[channel, frequency]`` of them; straight between its lines on
+        logarithmic axes, nothing outside them.
     frequencies_hz
         Natural frequencies, rising, above 0.
     q
@@ -201,6 +217,8 @@ def vibration_response(
         How long the vibration lasts.
     probability
         With which the peak isn't exceeded, between 0 and 1; 0.5 is the median of the highest peak.
+    frequency_hz
+        Of an array: its lines.
 
     Returns
     -------
@@ -222,16 +240,12 @@ def vibration_response(
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
-    >>> from chladni.signals.provenance import Provenance
-    >>> flat = PowerSpectralDensity(
-    ...     frequency_hz=np.linspace(1, 5000, 5000), values=np.ones((1, 5000)), std=np.zeros((1, 5000)),
-    ...     channels=(Channel(name="a", unit="m/s^2"),), bandwidth_hz=1.0, provenance=Provenance(),
-    ... )
-    >>> found = vibration_response(flat, frequencies_hz=[100.0])
+    >>> lines = np.linspace(1, 5000, 5000)
+    >>> found = vibration_response(np.ones(5000), frequency_hz=lines, frequencies_hz=[100.0])
     >>> round(float(found.rms[0, 0]), 1), round(float(found.miles[0, 0]), 1)
     (39.8, 39.6)
     """
+    density = density_of(source, frequency_hz=frequency_hz)
     natural_hz = np.atleast_1d(np.asarray(frequencies_hz, dtype=np.float64))
     if not (natural_hz.size and np.all(np.diff(natural_hz, prepend=0.0) > 0) and np.all(np.isfinite(natural_hz))):
         raise EstimateError("natural frequencies must rise, above 0 Hz")

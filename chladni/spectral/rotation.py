@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from chladni.io.source import SeriesLike, series_of
 from chladni.signals.arrays import Index, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.rotation import Rotation, RotationSource
@@ -17,7 +18,7 @@ HYSTERESIS = 0.25
 
 
 def rotation(
-    series: TimeSeries,
+    source: SeriesLike,
     *,
     tacho: str | None = None,
     phase: str | None = None,
@@ -28,13 +29,17 @@ def rotation(
     ridge_order: float = 1.0,
     ridge_hz: tuple[float, float] | None = None,
     resolution_hz: float | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> Rotation:
     """Tell how far a shaft has turned, from exactly one of four channels.
 
     Parameters
     ----------
-    series
-        Holds the channel.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        holds the channel.
     tacho
         A channel of pulses; each rising edge is ``1 / pulses_a_revolution`` of a turn.
     phase
@@ -50,6 +55,8 @@ def rotation(
         Level that a pulse passes; by default midway between the least and the greatest sample.
     resolution_hz
         Lines of the spectrum over time in which the ridge is followed, see `waterfall`.
+    sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -69,25 +76,23 @@ def rotation(
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
     >>> t = np.arange(2000) / 1000
-    >>> pulses = (np.mod(10 * t, 1) > 0.5) * 5.0  # ten revolutions a second
-    >>> x = TimeSeries(values=pulses[None], sample_rate_hz=1000.0, channels=(Channel(name="tacho", unit="V"),))
-    >>> turned = rotation(x, tacho="tacho").at(x)
-    >>> round(float(turned[1500] - turned[500]), 3)
-    10.0
+    >>> pulses = {"tacho": (np.mod(10 * t, 1) > 0.5) * 5.0}  # ten revolutions a second
+    >>> turned = rotation(pulses, tacho="tacho", sample_rate_hz=1000.0)
+    >>> float(turned.revolutions[-1]), float(turned.time_s[-1].round(2))
+    (19.0, 1.95)
     """
     named: dict[RotationSource, str | None] = {"tacho": tacho, "phase": phase, "speed": speed, "ridge": ridge}
-    given = [(source, name) for source, name in named.items() if name is not None]
+    given = [(telling, name) for telling, name in named.items() if name is not None]
     if len(given) != 1:
         raise EstimateError("name exactly one channel that tells the rotation: tacho, phase, speed or ridge")
-    source, name = given[0]
-    alone = series.select([name])
-    if source == "tacho":
+    telling, name = given[0]
+    alone = series_of(source, channels=name, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
+    if telling == "tacho":
         return _from_pulses(alone, pulses_a_revolution, threshold)
-    if source == "ridge":
+    if telling == "ridge":
         return _from_ridge(alone, ridge_order, ridge_hz, resolution_hz)
-    return _growing(alone, _from_phase(alone) if source == "phase" else _from_speed(alone), source)
+    return _growing(alone, _from_phase(alone) if telling == "phase" else _from_speed(alone), telling)
 
 
 def _from_pulses(series: TimeSeries, pulses_a_revolution: float, threshold: float | None) -> Rotation:

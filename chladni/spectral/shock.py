@@ -7,7 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from chladni.io.source import SeriesLike, series_of
 from chladni.signals.arrays import Mask, Real
+from chladni.signals.channel import Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.shock_response import ShockQuantity, ShockResponse
 from chladni.signals.time_series import TimeSeries
@@ -28,7 +30,7 @@ MOST_LINES = 10_000
 
 
 def srs(
-    series: TimeSeries,
+    source: SeriesLike,
     *,
     q: float = 10.0,
     quantity: ShockQuantity = "absolute-acceleration",
@@ -36,13 +38,18 @@ def srs(
     lines_an_octave: int = 12,
     frequencies_hz: Real | Sequence[float] | None = None,
     offset: Offset = "first",
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> ShockResponse:
     """Compute shock response spectra of base accelerations.
 
     Parameters
     ----------
-    series
-        Accelerations, of all channels.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        accelerations, of all channels.
     q
         Amplification of the oscillators at resonance, above 0.5; 10 is a damping ratio of 5 %.
     quantity
@@ -59,6 +66,8 @@ def srs(
         What is taken off first, so that the oscillators begin at rest, such as gravity: the ``first`` sample; the
         ``median``, which noise moves less, of a record that is quiet for most of its length; or nothing, ``keep``,
         which makes of an offset a step.
+    channels, sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -82,14 +91,13 @@ def srs(
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
     >>> t = np.arange(4000) / 20_000
     >>> pulse = np.where(t < 0.011, 500 * np.sin(np.pi * t / 0.011), 0.0)  # half a sine of 11 ms
-    >>> x = TimeSeries(values=pulse[None], sample_rate_hz=20e3, channels=(Channel(name="a", unit="m/s^2"),))
-    >>> spectrum = srs(x, q=1000.0, frequencies_hz=[0.8 / 0.011])  # undamped: 1.77 times as much, at most
-    >>> float((spectrum.maximax[0, 0] / 500).round(2))
+    >>> spectrum = srs(pulse, q=1000.0, frequencies_hz=[0.8 / 0.011], sample_rate_hz=20e3)
+    >>> float((spectrum.maximax[0, 0] / 500).round(2))  # nearly undamped: 1.77 times as much, at most
     1.77
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     _require_accelerations(series, quantity)
     if not 0.5 < q < np.inf:
         raise EstimateError(f"q is {q:g}; it must be finite and above 0.5, such as 10 for 5 % damping")

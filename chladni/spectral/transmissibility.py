@@ -4,34 +4,39 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from chladni.io.source import SeriesLike
+from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
-from chladni.signals.time_series import TimeSeries
 from chladni.signals.unit_text import in_unit
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.frequency_response import frequency_response
 
 
 def transmissibility(
-    source: CrossSpectra | TimeSeries,
+    source: CrossSpectra | SeriesLike,
     *,
     references: str,
-    responses: str | Sequence[str] | None = None,
+    responses: Names | None = None,
     resolution_hz: float | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> FrequencyResponse:
     """Estimate how motion passes from one point to others, T = response/reference.
 
     Parameters
     ----------
     source
-        Averaged cross-spectra that hold the motions; of a series they are averaged first.
+        Averaged cross-spectra that hold the motions; or a log, the path to one, a series or an array
+        ``[channel, sample]``, whose cross-spectra are averaged after Welch first.
     references
         Name of the channel at the point where the motion comes from.
     responses
         Names of the channels it goes to; None takes every other channel in the reference's unit.
-    resolution_hz
-        Of a series, distance of the lines.
+    resolution_hz, sample_rate_hz, start_s, end_s
+        Of samples: how they are averaged, see `cross_spectra`.
 
     Returns
     -------
@@ -49,12 +54,22 @@ def transmissibility(
     -----
     T1 = G_ref,resp / G_ref,ref: H1 with a motion as its reference, and with the random error of H1.
     """
-    spectra = source if isinstance(source, CrossSpectra) else cross_spectra(source, resolution_hz=resolution_hz)
+    if isinstance(source, CrossSpectra):
+        spectra = source
+    else:
+        spectra = cross_spectra(
+            source,
+            channels=None if responses is None else dict.fromkeys((references, *as_names(responses))),
+            resolution_hz=resolution_hz,
+            sample_rate_hz=sample_rate_hz,
+            start_s=start_s,
+            end_s=end_s,
+        )
     unit = spectra.channels[spectra.index(references)].unit
     if responses is None:
         chosen = [c.name for c in spectra.channels if c.unit == unit and c.name != references]
     else:
-        chosen = [responses] if isinstance(responses, str) else list(responses)
+        chosen = list(as_names(responses))
     if not chosen:
         raise EstimateError(
             f"no channel but {references!r} is {in_unit(unit)}; transmissibility needs two in one unit"

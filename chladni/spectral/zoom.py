@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from chladni.io.source import SeriesLike, series_of
+from chladni.signals.channel import Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.provenance import Provenance
-from chladni.signals.time_series import TimeSeries
 from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum, Quantity
 from chladni.spectral.filters import channel_runs, require_measured
 from chladni.spectral.windows import Window, noise_bandwidth_bins, window_name, window_samples
@@ -13,19 +14,24 @@ MOST_LINES = 1_000_000
 
 
 def zoom_spectrum(
-    series: TimeSeries,
+    source: SeriesLike,
     *,
     band_hz: tuple[float, float],
     lines: int = 2000,
     window: Window = "hann",
     quantity: Quantity = "peak",
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> AmplitudeSpectrum:
     """Give the amplitudes of the whole record on fine lines within a band.
 
     Parameters
     ----------
-    series
-        Of all channels; the longest run that all of them have is transformed at once, without means.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        of all channels; the longest run that all of them have is transformed at once, without means.
     band_hz
         First and last line, between 0 and half the sample rate.
     lines
@@ -35,6 +41,8 @@ def zoom_spectrum(
         As in `scipy.signal.get_window`.
     quantity
         ``peak`` or ``rms`` of a sine.
+    channels, sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
@@ -52,14 +60,13 @@ def zoom_spectrum(
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
     >>> tone = 2.0 * np.sin(2 * np.pi * 50.123 * np.arange(10_000) / 1000)
-    >>> x = TimeSeries(values=tone[None], sample_rate_hz=1000.0, channels=(Channel(name="a"),))
-    >>> found = zoom_spectrum(x, band_hz=(49.0, 51.0), lines=2001)
+    >>> found = zoom_spectrum(tone, band_hz=(49.0, 51.0), lines=2001, sample_rate_hz=1000.0)
     >>> highest = found.values[0].argmax()
     >>> round(float(found.frequency_hz[highest]), 3), round(float(found.values[0, highest]), 3)
     (50.123, 2.0)
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     from scipy.signal import zoom_fft
 
     low_hz, high_hz = band_hz

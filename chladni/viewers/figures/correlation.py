@@ -33,7 +33,7 @@ def _figures(found: CrossCorrelation, delay_s: np.ndarray) -> dict[str, Figure]:
         for page, rows in pages(len(found.responses), A_SHEET):
             figure, stack = sheet([HEIGHT_IN] * len(rows), sharex=True, sharey=True)
             for axes, row in zip(stack, rows, strict=True):
-                _draw(axes, found, row, float(delay_s[row]))
+                draw_correlation(axes, found, row, float(delay_s[row]))
                 axes.set_title(plain(labels[found.responses[row].name]), loc="left", pad=2)
             stack[-1].set_xlabel(plain(f"Lag after {labels[found.reference.name]} [s]"))
             stack[-1].set_xlim(found.lag_s[0], found.lag_s[-1])
@@ -42,7 +42,8 @@ def _figures(found: CrossCorrelation, delay_s: np.ndarray) -> dict[str, Figure]:
     return figures
 
 
-def _draw(axes: Axes, found: CrossCorrelation, row: int, delay_s: float) -> None:
+def draw_correlation(axes: Axes, found: CrossCorrelation, row: int, delay_s: float) -> None:
+    """Draw the coefficients of one response into given axes, with its delay where that is finite."""
     values = np.asarray(found.values[row], dtype=np.float64)
     shown, _ = thin(values, limit=POINTS)
     axes.axhline(0, color="#888888", linewidth=0.6, zorder=0)

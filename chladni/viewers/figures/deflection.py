@@ -30,14 +30,20 @@ def deflection_figures(found: DeflectionShapes) -> dict[str, Figure]:
 def _figure(found: DeflectionShapes, group: Group, names: list[str], rows: range) -> Figure:
     figure, stack = sheet([HEIGHT_IN] * len(rows), sharex=True)
     for axes, row in zip(stack, rows, strict=True):
-        _draw(axes, found, group, row)
-    stack[-1].set_xticks(range(len(names)), names, rotation=0 if len(names) < 5 else 30, ha="center")
+        draw_deflection(axes, found, group, row)
+    name_channels(stack[-1], names)
     figure.supylabel(f"RMS [{printed_unit(group.unit)}]", fontsize=8.5)
     legend(stack[0], above_points=10.0)
     return figure
 
 
-def _draw(axes: Axes, found: DeflectionShapes, group: Group, row: int) -> None:
+def name_channels(axes: Axes, names: list[str]) -> None:
+    """Name the channels below, at an angle where they are many."""
+    axes.set_xticks(range(len(names)), names, rotation=0 if len(names) < 5 else 30, ha="center")
+
+
+def draw_deflection(axes: Axes, found: DeflectionShapes, group: Group, row: int) -> None:
+    """Draw one shape of the channels of one unit into given axes."""
     columns = list(group.rows)
     values, std = found.values[row, columns], found.std[row, columns]
     place = np.arange(len(columns))

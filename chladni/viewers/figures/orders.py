@@ -17,6 +17,7 @@ from chladni.viewers.labels import decibel_unit, printed_unit, short_names
 from chladni.viewers.style import ON_LIGHT
 
 RPM = 60.0
+MAP_IN, CUTS_IN = 3.0, (2.2, 1.2)
 # Circles along an order; more run into a band.
 CIRCLES = 60
 LARGEST_CIRCLE_POINTS = 14.0
@@ -38,11 +39,18 @@ def order_figures(maps: Sequence[OrderMap], cuts: Sequence[OrderCuts]) -> dict[s
 
 
 def _map_figure(found: OrderMap, row: int, label: str) -> Figure:
-    figure, (axes,) = sheet([3.0])
+    figure, (axes,) = sheet([MAP_IN])
+    draw_order_map(axes, found, row, label)
+    axes.set_xlabel(along(found)[1])
+    return figure
+
+
+def draw_order_map(axes: Axes, found: OrderMap, row: int, label: str) -> None:
+    """Draw the map of one channel into given axes, with its scale beside."""
     level = decibels_of_amplitude(found.values[row])
     level, slices = block_maximum(level, axis=0, limit=PIXELS)
     level, lines = block_maximum(level, axis=1, limit=PIXELS)
-    where, name = _along(found)
+    where, _ = along(found)
     known = level[np.isfinite(level)]
     high = float(known.max()) if known.size else 0.0
     axes.grid(visible=False)
@@ -55,38 +63,47 @@ def _map_figure(found: OrderMap, row: int, label: str) -> Figure:
         vmax=high,
         rasterized=True,
     )
-    axes.set_xlabel(name)
     axes.set_ylabel("Order")
     axes.set_title(plain(label), loc="left", pad=2)
-    bar = figure.colorbar(image, ax=axes, aspect=18, pad=0.02)
+    bar = axes.figure.colorbar(image, ax=axes, aspect=18, pad=0.02)
     bar.set_label(f"Peak amplitude [{decibel_unit(found.channels[row].unit)}]")
     bar.outline.set_linewidth(0.0)
-    return figure
 
 
 def _cuts_figure(cuts: OrderCuts, row: int, label: str) -> Figure:
-    figure, (sizes, phases) = sheet([2.2, 1.2], sharex=True)
-    where, name = _along(cuts)
+    figure, (sizes, phases) = sheet(list(CUTS_IN), sharex=True)
+    draw_order_sizes(sizes, cuts, row)
+    draw_order_phases(phases, cuts, row)
+    phases.set_xlabel(along(cuts)[1])
+    _title(figure, label)
+    return figure
+
+
+def draw_order_sizes(axes: Axes, cuts: OrderCuts, row: int) -> None:
+    """Draw the amplitudes of one channel's orders into given axes."""
+    where, _ = along(cuts)
     amplitude = np.abs(cuts.values[row])
     shown = amplitude[amplitude > 0]
     if shown.size:
         low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
-        logarithmic(sizes, max(low, high / 1e4) / 1.5, high * 1.5)
+        logarithmic(axes, max(low, high / 1e4) / 1.5, high * 1.5)
     for place, order in enumerate(cuts.orders.tolist()):
-        colour = paint(ON_LIGHT[place % len(ON_LIGHT)])
-        sizes.plot(
-            where, np.where(amplitude[place] > 0, amplitude[place], np.nan), color=colour, label=f"order {order:g}"
-        )
+        positive = np.where(amplitude[place] > 0, amplitude[place], np.nan)
+        axes.plot(where, positive, color=paint(ON_LIGHT[place % len(ON_LIGHT)]), label=f"order {order:g}")
+    axes.set_ylabel(f"Peak amplitude [{printed_unit(cuts.channels[row].unit)}]")
+    legend(axes)
+
+
+def draw_order_phases(axes: Axes, cuts: OrderCuts, row: int) -> None:
+    """Draw the phases of one channel's orders into given axes."""
+    where, _ = along(cuts)
+    for place in range(cuts.orders.size):
         phase = np.angle(cuts.values[row, place], deg=True)
-        phases.plot(*with_breaks(where, phase, phase_wraps(phase)), color=colour)
-    sizes.set_ylabel(f"Peak amplitude [{printed_unit(cuts.channels[row].unit)}]")
-    phases.set_ylabel("Phase [deg]")
-    phases.set_ylim(-180, 180)
-    phases.set_yticks([-180, -90, 0, 90, 180])
-    phases.set_xlabel(name)
-    _title(figure, label)
-    legend(sizes)
-    return figure
+        line = with_breaks(where, phase, phase_wraps(phase))
+        axes.plot(*line, color=paint(ON_LIGHT[place % len(ON_LIGHT)]))
+    axes.set_ylabel("Phase [deg]")
+    axes.set_ylim(-180, 180)
+    axes.set_yticks([-180, -90, 0, 90, 180])
 
 
 def _campbell_figure(cuts: OrderCuts, row: int, label: str) -> Figure:
@@ -127,8 +144,8 @@ def _draw_order(axes: Axes, rpm: Real, order: float, share: Real, place: int) ->
     )
 
 
-def _along(found: OrderMap | OrderCuts) -> tuple[Real, str]:
-    """Speed where it runs one way, as in a run-up, time where it doesn't."""
+def along(found: OrderMap | OrderCuts) -> tuple[Real, str]:
+    """Give what the picture runs along, and its name: speed where that runs one way, time where it doesn't."""
     steps = np.diff(found.speed_hz)
     if steps.size and (np.all(steps > 0) or np.all(steps < 0)):
         return RPM * found.speed_hz, "Speed [rpm]"

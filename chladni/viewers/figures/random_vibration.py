@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chladni.signals.arrays import Real
@@ -58,44 +59,35 @@ def _tolerance_figure(
     return figure
 
 
-def probability_figure(found: ProbabilityDensity) -> Figure:
+def draw_probability(axes: Axes, found: ProbabilityDensity, style: Style) -> None:
     """Draw how often amplitudes occur, on a logarithmic scale, beside Gaussian noise."""
-    style = Style.of_channels(found.channels)
-    with look():
-        figure, (axes,) = sheet([HEIGHT_IN])
-        axes.plot(found.deviation, found.gaussian, "--", color=ALLOWED, label="Gaussian")
-        for row, channel in enumerate(found.channels):
-            colour = paint(style.on_light(channel))
-            # An empty bin lies below the picture.
-            density = np.maximum(found.density[row], LEAST / 10)
-            axes.step(found.deviation, density, where="mid", color=colour, label=plain(style.labels[channel.name]))
-        logarithmic(axes, LEAST, 2.0)
-        axes.set_xlabel("Deviation from the mean [standard deviations]")
-        axes.set_ylabel("Probability density")
-        legend(axes)
-    return figure
+    axes.plot(found.deviation, found.gaussian, "--", color=ALLOWED, label="Gaussian")
+    for row, channel in enumerate(found.channels):
+        colour = paint(style.on_light(channel))
+        # An empty bin lies below the picture.
+        density = np.maximum(found.density[row], LEAST / 10)
+        axes.step(found.deviation, density, where="mid", color=colour, label=plain(style.labels[channel.name]))
+    logarithmic(axes, LEAST, 2.0)
+    axes.set_ylabel("Probability density")
+    legend(axes)
 
 
-def vibration_response_figure(found: VibrationResponse) -> Figure:
+def draw_vibration_response(axes: Axes, found: VibrationResponse, group: Group, style: Style) -> None:
     """Draw the peaks over natural frequency, with three times the RMS by Miles beside."""
-    style = Style.of_channels(found.channels)
-    with look():
-        figure, (axes,) = sheet([HEIGHT_IN])
-        for row, channel in enumerate(found.channels):
-            colour = paint(style.on_light(channel))
-            label = plain(style.labels[channel.name])
-            axes.plot(found.frequency_hz, _positive(found.peak[row]), color=colour, label=f"{label}: peak")
-            axes.plot(found.frequency_hz, _positive(3 * found.miles[row]), ":", color=colour)
-        axes.plot([], [], ":", color="#555555", label="3 × Miles")
-        positive = found.peak[found.peak > 0]
-        if positive.size:
-            logarithmic(axes, float(positive.min()) / 3, float(positive.max()) * 2)
-        logarithmic_frequency(axes, float(found.frequency_hz[0]), float(found.frequency_hz[-1]))
-        unit = printed_unit(found.channels[0].unit)
-        axes.set_xlabel("Natural frequency [Hz]")
-        axes.set_ylabel(f"Absolute acceleration in {found.duration_s:g} s, Q = {found.q:g} [{unit}]")
-        legend(axes)
-    return figure
+    for row in group.rows:
+        channel = found.channels[row]
+        colour = paint(style.on_light(channel))
+        axes.plot(
+            found.frequency_hz, _positive(found.peak[row]), color=colour, label=plain(style.labels[channel.name])
+        )
+        axes.plot(found.frequency_hz, _positive(3 * found.miles[row]), ":", color=colour)
+    axes.plot([], [], ":", color="#555555", label="3 × Miles")
+    positive = found.peak[found.peak > 0]
+    if positive.size:
+        logarithmic(axes, float(positive.min()) / 3, float(positive.max()) * 2)
+    logarithmic_frequency(axes, float(found.frequency_hz[0]), float(found.frequency_hz[-1]))
+    axes.set_ylabel(f"Peak in {found.duration_s:g} s, Q = {found.q:g} [{printed_unit(group.unit)}]")
+    legend(axes)
 
 
 def _positive(values: Real) -> Real:

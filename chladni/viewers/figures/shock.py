@@ -16,6 +16,7 @@ from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import Style
 
 HEIGHT_IN = 3.2
+X_LABEL = "Natural frequency [Hz]"
 DIRECTIONS: dict[str, Literal[":", "--"]] = {"positive": ":", "negative": "--"}
 _WORDS = {
     "absolute-acceleration": "Absolute acceleration",
@@ -37,6 +38,13 @@ def shock_figures(responses: Sequence[ShockResponse]) -> dict[str, Figure]:
 
 def _figure(response: ShockResponse, group: Group, style: Style) -> Figure:
     figure, (axes,) = sheet([HEIGHT_IN])
+    draw_shock(axes, response, group, style)
+    axes.set_xlabel(X_LABEL)
+    return figure
+
+
+def draw_shock(axes: Axes, response: ShockResponse, group: Group, style: Style) -> None:
+    """Draw the spectra of one group into given axes."""
     rows = list(group.rows)
     for row in rows:
         _draw(axes, response, row, style, directions=len(rows) <= BANDS_OF)
@@ -49,10 +57,8 @@ def _figure(response: ShockResponse, group: Group, style: Style) -> Figure:
         # One direction alone may be orders below: what it shows there is no response.
         logarithmic(axes, float(positive.min()) / 3, float(positive.max()) * 1.5)
     logarithmic_frequency(axes, float(response.frequency_hz[0]), float(response.frequency_hz[-1]))
-    axes.set_xlabel("Natural frequency [Hz]")
     axes.set_ylabel(f"{_WORDS[response.quantity]}, Q = {response.q:g} [{printed_unit(group.unit)}]")
     legend(axes)
-    return figure
 
 
 def _draw(axes: Axes, response: ShockResponse, row: int, style: Style, *, directions: bool) -> None:
