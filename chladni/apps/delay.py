@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from chladni.apps.sources import Span, joined
+from chladni.apps.sources import Span, joined, moving_channels
 from chladni.io.log import Log
 from chladni.signals.cross_correlation import TimeDelays
 from chladni.signals.errors import EstimateError
@@ -57,6 +57,6 @@ def _of_its_unit(log: Log, reference: str, span: Span) -> TimeSeries:
         if reference in names:
             unit = series.channels[names.index(reference)].unit
             # A channel that never changes has no delay.
-            return series.select([c.name for c, row in zip(series.channels, series.values, strict=True)
-                                  if c.name == reference or (c.unit == unit and row.min() < row.max())])  # fmt: skip
+            others = [name for name in moving_channels(series) if series.channels[names.index(name)].unit == unit]
+            return series.select(list(dict.fromkeys((reference, *others))))
     return log.read([reference], start_s=span.start_s, end_s=span.end_s)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from chladni.apps.sources import Span
+from chladni.apps.sources import Span, moving_channels
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import EstimateError
@@ -21,7 +21,7 @@ def shock_responses(
     log
         Read into memory.
     channels
-        Message paths; None for every channel in m/s^2 or rad/s^2.
+        Message paths; None for every channel in m/s^2 or rad/s^2 that changes.
     span
         Which part of the log.
     options
@@ -43,7 +43,13 @@ def shock_responses(
                 f"{log.path.name}: no channel is an acceleration; units are {some_of(units)}: name a channel "
                 "(--channel), or give its unit in a setup file (--setup)"
             )
-        series = tuple(one.select(names) for one, names in zip(series, chosen, strict=True) if names)
+        moving = [
+            [name for name in moving_channels(one) if name in names]
+            for one, names in zip(series, chosen, strict=True)
+        ]
+        # Of channels that never change each oscillator stays at rest.
+        kept = moving if any(moving) else chosen
+        series = tuple(one.select(names) for one, names in zip(series, kept, strict=True) if names)
     try:
         return tuple(srs(one, **options) for one in series)
     except EstimateError as error:

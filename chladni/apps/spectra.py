@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from chladni.apps.excitation import excitation_names, stored_functions
-from chladni.apps.sources import Progress, Span, Watched, no_progress, on_one_grid, watched_grids
+from chladni.apps.sources import Progress, Span, Watched, moving_channels, no_progress, on_one_grid, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.io.source import SeriesLike, log_or_series
@@ -323,11 +323,8 @@ def zoomed(log: Log, *, channels: Sequence[str] | None, span: Span, **options: A
     """
     groups = log.read_groups(channels, start_s=span.start_s, end_s=span.end_s)
     if channels is None:
-        moving = [
-            [c.name for c, row in zip(one.channels, one.values, strict=True) if np.nanmin(row) < np.nanmax(row)]
-            for one in groups
-        ]
-        groups = tuple(one.select(names) for one, names in zip(groups, moving, strict=True) if names) or groups
+        kept = [moving_channels(one) for one in groups]
+        groups = tuple(one.select(names) for one, names in zip(groups, kept, strict=True) if names) or groups
     try:
         return tuple(zoom_spectrum(one, **options) for one in groups)
     except EstimateError as error:

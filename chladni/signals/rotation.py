@@ -58,7 +58,8 @@ class Rotation(Value):
         for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             if last - first < 2:
                 continue
-            inside = (when_s >= self.time_s[first]) & (when_s <= self.time_s[last - 1])
+            begin = int(np.searchsorted(when_s, self.time_s[first], side="left"))
+            end = int(np.searchsorted(when_s, self.time_s[last - 1], side="right"))
             spline = CubicSpline(self.time_s[first:last], self.revolutions[first:last])
-            found[inside] = spline(when_s[inside])
+            found[begin:end] = spline(when_s[begin:end])
         return found

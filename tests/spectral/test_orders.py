@@ -166,6 +166,21 @@ def test_another_clock_may_tell_the_shaft():
     np.testing.assert_allclose(np.abs(found.values[0, 0]), np.abs(amplitude(2.0, found.speed_hz)), rtol=0.01)
 
 
+def test_where_the_angle_is_not_known_no_window_reaches():
+    angle = run_up().values[2].copy()
+    angle[40_000:41_000] = np.nan
+    gapped = TimeSeries(
+        values=angle[None],
+        sample_rate_hz=RATE_HZ,
+        channels=(Channel(name="angle", unit="rad"),),
+        start_time_ns=10**18,
+    )
+    found = order_cuts(vibration(), rotation(gapped, phase="angle"), orders=[1.0])
+    # Half a window of 8 revolutions, at 23 of them a second.
+    assert np.all((found.time_s < 40.0 - 0.1) | (found.time_s > 41.0 + 0.1))
+    np.testing.assert_allclose(np.abs(found.values[0, 0]), np.abs(amplitude(1.0, found.speed_hz)), rtol=0.01)
+
+
 def test_a_lost_pulse_is_counted_and_told():
     t = np.arange(10_000) / RATE_HZ
     pulses = (np.mod(20 * t, 1) < 0.5) * 1.0
