@@ -122,7 +122,10 @@ _HOME = {
     "Cepstrum": "chladni.signals.cepstrum",
     "Channel": "chladni.signals.channel",
     "Coherence": "chladni.signals.coherence",
+    "CrossCorrelation": "chladni.signals.cross_correlation",
+    "TimeDelays": "chladni.signals.cross_correlation",
     "CrossSpectra": "chladni.signals.cross_spectra",
+    "DeflectionShapes": "chladni.signals.deflection_shapes",
     "Bearing": "chladni.signals.envelope",
     "EnvelopeSpectrum": "chladni.signals.envelope",
     "Kurtogram": "chladni.signals.envelope",
@@ -131,6 +134,7 @@ _HOME = {
     "LogError": "chladni.signals.errors",
     "ModelError": "chladni.signals.errors",
     "SetupError": "chladni.signals.errors",
+    "FilteredSeries": "chladni.signals.filtered_series",
     "FrequencyResponse": "chladni.signals.frequency_response",
     "Geometry": "chladni.signals.geometry",
     "Levels": "chladni.signals.levels",
@@ -138,9 +142,17 @@ _HOME = {
     "Severity": "chladni.signals.levels",
     "ModalAssurance": "chladni.signals.modal_assurance",
     "ModeSet": "chladni.signals.mode_set",
+    "OrderCuts": "chladni.signals.order_spectra",
+    "OrderMap": "chladni.signals.order_spectra",
     "Peak": "chladni.signals.peak",
     "PowerSpectralDensity": "chladni.signals.power_spectral_density",
     "Provenance": "chladni.signals.provenance",
+    "ProbabilityDensity": "chladni.signals.random_vibration",
+    "ProfileCheck": "chladni.signals.random_vibration",
+    "RandomProfile": "chladni.signals.random_vibration",
+    "VibrationResponse": "chladni.signals.random_vibration",
+    "Rotation": "chladni.signals.rotation",
+    "ShockResponse": "chladni.signals.shock_response",
     "StabilisationDiagram": "chladni.signals.stabilisation_diagram",
     "Study": "chladni.signals.study",
     "TimeSeries": "chladni.signals.time_series",
@@ -154,7 +166,14 @@ _HOME = {
     "coherence": "chladni.spectral.coherence",
     "partial_coherence": "chladni.spectral.coherence",
     "cross_spectra": "chladni.spectral.cross_spectra",
+    "deflection_shapes": "chladni.spectral.deflection",
+    "cross_correlation": "chladni.spectral.delay",
+    "time_delay": "chladni.spectral.delay",
     "envelope": "chladni.spectral.envelope",
+    "bandpass": "chladni.spectral.filters",
+    "bandstop": "chladni.spectral.filters",
+    "highpass": "chladni.spectral.filters",
+    "lowpass": "chladni.spectral.filters",
     "convert_form": "chladni.spectral.forms",
     "find_impacts": "chladni.spectral.impact",
     "impact_cross_spectra": "chladni.spectral.impact",
@@ -165,12 +184,21 @@ _HOME = {
     "kurtogram": "chladni.spectral.kurtogram",
     "levels": "chladni.spectral.levels",
     "octaves": "chladni.spectral.octaves",
+    "order_cuts": "chladni.spectral.orders",
+    "order_map": "chladni.spectral.orders",
     "find_peaks": "chladni.spectral.peaks",
     "find_response_peaks": "chladni.spectral.peaks",
+    "check_profile": "chladni.spectral.random_vibration",
+    "probability_density": "chladni.spectral.random_vibration",
+    "random_profile": "chladni.spectral.random_vibration",
+    "vibration_response": "chladni.spectral.random_vibration",
+    "rotation": "chladni.spectral.rotation",
     "severity": "chladni.spectral.severity",
+    "srs": "chladni.spectral.shock",
     "transmissibility": "chladni.spectral.transmissibility",
     "transmissibility_along": "chladni.spectral.transmissibility",
     "waterfall": "chladni.spectral.waterfall",
+    "zoom_spectrum": "chladni.spectral.zoom",
     "Album": "chladni.viewers.figures.album",
     "save_figures": "chladni.viewers.figures.saving",
 }
@@ -192,15 +220,18 @@ __all__ = [
     "Clues",
     "Coherence",
     "CovarianceDrivenSubspace",
+    "CrossCorrelation",
     "CrossSpectra",
     "CrossSpectraAccumulator",
     "Damper",
     "DeflectionShape",
+    "DeflectionShapes",
     "Diagnosis",
     "EffectKind",
     "EnhancedFrequencyDomainDecomposition",
     "EnvelopeSpectrum",
     "EstimateError",
+    "FilteredSeries",
     "FrequencyDomainDecomposition",
     "FrequencyResponse",
     "Geometry",
@@ -220,18 +251,25 @@ __all__ = [
     "MujocoSimulator",
     "Multisine",
     "OctaveLevels",
+    "OrderCuts",
+    "OrderMap",
     "Parameter",
     "Parameters",
     "Peak",
     "PolyReferenceLeastSquares",
     "Port",
     "PowerSpectralDensity",
+    "ProbabilityDensity",
+    "ProfileCheck",
     "Provenance",
     "RandomNoise",
+    "RandomProfile",
+    "Rotation",
     "SchemeModel",
     "SchemeOutput",
     "SetupError",
     "Severity",
+    "ShockResponse",
     "Simulation",
     "StabilisationDiagram",
     "StructureInput",
@@ -239,8 +277,10 @@ __all__ = [
     "StructureOutput",
     "Study",
     "Terminal",
+    "TimeDelays",
     "TimeSeries",
     "Variant",
+    "VibrationResponse",
     "Waterfall",
     "Wish",
     "amplitude_spectrum",
@@ -248,17 +288,22 @@ __all__ = [
     "arm_model",
     "attached",
     "band_rms",
+    "bandpass",
+    "bandstop",
     "best_joint",
     "callable_simulator",
     "cepstrum",
     "check_driving_point",
     "check_linearity",
+    "check_profile",
     "check_reciprocity",
     "coherence",
     "compare_levels",
     "convert_form",
+    "cross_correlation",
     "cross_spectra",
     "deflection_shape",
+    "deflection_shapes",
     "diagnose_gap",
     "diagnose_simulator",
     "differentiate",
@@ -275,6 +320,7 @@ __all__ = [
     "fit_mr_damper",
     "force_along_motion",
     "frf",
+    "highpass",
     "identify_modes",
     "impact_cross_spectra",
     "influence",
@@ -288,6 +334,7 @@ __all__ = [
     "load_robot",
     "load_setup",
     "locate_from_levels",
+    "lowpass",
     "mac",
     "machine_harmonics",
     "make_demo_log",
@@ -300,26 +347,34 @@ __all__ = [
     "open",
     "open_log",
     "optimise",
+    "order_cuts",
+    "order_map",
     "partial_coherence",
     "phase_referenced_shape",
     "place_damper",
     "plot",
+    "probability_density",
     "psd",
+    "random_profile",
     "read_uff_modes",
     "relative_motion",
     "robot_arm",
+    "rotation",
     "roving_hammer",
     "save_figures",
     "severity",
     "shape_transmissibility",
     "show",
     "simulate",
+    "srs",
+    "time_delay",
     "transmissibility",
     "transmissibility_along",
     "treatments",
     "tuned_model",
     "unit_modal_mass_shapes",
     "validate",
+    "vibration_response",
     "waterfall",
     "write_mcap",
     "write_model",
@@ -327,6 +382,7 @@ __all__ = [
     "write_trajectory",
     "write_uff",
     "write_uff_modes",
+    "zoom_spectrum",
 ]
 
 # What values call to be drawn and made into tables.
@@ -420,17 +476,24 @@ if TYPE_CHECKING:
     from chladni.signals.cepstrum import Cepstrum
     from chladni.signals.channel import Channel
     from chladni.signals.coherence import Coherence
+    from chladni.signals.cross_correlation import CrossCorrelation, TimeDelays
     from chladni.signals.cross_spectra import CrossSpectra
+    from chladni.signals.deflection_shapes import DeflectionShapes
     from chladni.signals.envelope import Bearing, EnvelopeSpectrum, Kurtogram
     from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
+    from chladni.signals.filtered_series import FilteredSeries
     from chladni.signals.frequency_response import FrequencyResponse
     from chladni.signals.geometry import Geometry
     from chladni.signals.levels import BandLevels, Levels, OctaveLevels, Severity
     from chladni.signals.modal_assurance import ModalAssurance
     from chladni.signals.mode_set import ModeSet
+    from chladni.signals.order_spectra import OrderCuts, OrderMap
     from chladni.signals.peak import Peak
     from chladni.signals.power_spectral_density import PowerSpectralDensity
     from chladni.signals.provenance import Provenance
+    from chladni.signals.random_vibration import ProbabilityDensity, ProfileCheck, RandomProfile, VibrationResponse
+    from chladni.signals.rotation import Rotation
+    from chladni.signals.shock_response import ShockResponse
     from chladni.signals.stabilisation_diagram import StabilisationDiagram
     from chladni.signals.study import Study
     from chladni.signals.time_series import TimeSeries
@@ -441,17 +504,30 @@ if TYPE_CHECKING:
     from chladni.spectral.cepstrum import cepstrum
     from chladni.spectral.coherence import coherence, partial_coherence
     from chladni.spectral.cross_spectra import cross_spectra
+    from chladni.spectral.deflection import deflection_shapes
+    from chladni.spectral.delay import cross_correlation, time_delay
     from chladni.spectral.envelope import envelope
+    from chladni.spectral.filters import bandpass, bandstop, highpass, lowpass
     from chladni.spectral.forms import convert_form
     from chladni.spectral.impact import find_impacts, impact_cross_spectra
     from chladni.spectral.integration import differentiate, differentiate_density, integrate, integrate_density
     from chladni.spectral.kurtogram import kurtogram
     from chladni.spectral.levels import levels
     from chladni.spectral.octaves import octaves
+    from chladni.spectral.orders import order_cuts, order_map
     from chladni.spectral.peaks import find_peaks, find_response_peaks
+    from chladni.spectral.random_vibration import (
+        check_profile,
+        probability_density,
+        random_profile,
+        vibration_response,
+    )
+    from chladni.spectral.rotation import rotation
     from chladni.spectral.severity import severity
+    from chladni.spectral.shock import srs
     from chladni.spectral.transmissibility import transmissibility, transmissibility_along
     from chladni.spectral.waterfall import waterfall
+    from chladni.spectral.zoom import zoom_spectrum
     from chladni.viewers.figures.album import Album
     from chladni.viewers.figures.saving import save_figures
 else:

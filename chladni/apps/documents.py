@@ -9,14 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.comparison import DensityComparison, LevelChange, PeakChange
+from chladni.signals.cross_correlation import TimeDelays
+from chladni.signals.deflection_shapes import DeflectionShapes
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.shock_response import ShockResponse
+from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum
 from chladni.spectral.bands import total_rms
 from chladni.spectral.peaks import find_peaks, judged_above_hz
 
 if TYPE_CHECKING:
     from chladni.apps.compare import LogComparison
+    from chladni.apps.orders import OrderStudy
+    from chladni.apps.tolerance import Tolerated
 
 Document = dict[str, Any]
 
@@ -63,6 +69,162 @@ def frf_document(response: FrequencyResponse, peaks: Sequence[Peak]) -> Document
             for column in range(len(response.references))
         ],
         "notes": list(response.provenance.notes),
+    }
+
+
+def shock_document(found: Sequence[ShockResponse]) -> Document:
+    """Document of ``chladni srs``.
+
+    The axis of the first sampling grid stands at the top; channels of other grids carry their own under the same key.
+    """
+    first = found[0]
+    channels = []
+    for response in found:
+        own_axis = {} if response is first else {"frequency_hz": plain(response.frequency_hz)}
+        channels += [
+            {
+                "name": channel.name,
+                "unit": channel.unit,
+                "maximax": plain(response.maximax[row]),
+                "positive": plain(response.positive[row]),
+                "negative": plain(response.negative[row]),
+                "offset": finite(float(response.offset[row])),
+                **own_axis,
+            }
+            for row, channel in enumerate(response.channels)
+        ]
+    return {
+        "format": "chladni.srs/1",
+        "frequency_hz": plain(first.frequency_hz),
+        "quantity": first.quantity,
+        "q": first.q,
+        "channels": channels,
+        "notes": list(dict.fromkeys(note for response in found for note in response.notes)),
+    }
+
+
+def orders_document(found: "OrderStudy") -> Document:
+    """Document of ``chladni orders``; each sampling grid has points of its own."""
+    return {
+        "format": "chladni.orders/1",
+        "rotation": found.rotation.source,
+        "method": found.cuts[0].method,
+        "orders": plain(found.cuts[0].orders),
+        "grids": [
+            {
+                "time_s": plain(cuts.time_s),
+                "speed_hz": plain(cuts.speed_hz),
+                "channels": [
+                    {
+                        "name": channel.name,
+                        "unit": channel.unit,
+                        "cuts": [
+                            {
+                                "order": order,
+                                "amplitude": plain(np.abs(cuts.values[row, place])),
+                                "phase_deg": plain(np.angle(cuts.values[row, place], deg=True)),
+                            }
+                            for place, order in enumerate(cuts.orders.tolist())
+                        ],
+                    }
+                    for row, channel in enumerate(cuts.channels)
+                ],
+            }
+            for cuts in found.cuts
+        ],
+        "notes": list(found.rotation.notes),
+    }
+
+
+def delay_document(found: TimeDelays) -> Document:
+    """Document of ``chladni delay``."""
+    return {
+        "format": "chladni.delay/1",
+        "reference": found.reference.name,
+        "band_hz": list(found.band_hz),
+        "delays": [
+            {
+                "response": channel.name,
+                "delay_s": finite(float(found.delay_s[row])),
+                "std_s": finite(float(found.std_s[row])),
+                "coherence": finite(float(found.coherence[row])),
+                "inverted": found.inverted[row],
+            }
+            for row, channel in enumerate(found.responses)
+        ],
+        "notes": list(found.notes),
+    }
+
+
+def deflection_document(found: DeflectionShapes) -> Document:
+    """Document of ``chladni ods``."""
+    return {
+        "format": "chladni.ods/1",
+        "reference": found.reference,
+        "bandwidth_hz": found.bandwidth_hz,
+        "shapes": [
+            {
+                "frequency_hz": frequency_hz,
+                "shape": [
+                    {
+                        "channel": channel.name,
+                        "unit": channel.unit,
+                        "rms": finite(float(abs(found.values[row, column]))),
+                        "std": finite(float(found.std[row, column])),
+                        "phase_deg": finite(float(np.angle(found.values[row, column], deg=True))),
+                        "coherence": finite(float(found.coherence[row, column])),
+                    }
+                    for column, channel in enumerate(found.channels)
+                ],
+            }
+            for row, frequency_hz in enumerate(found.frequency_hz.tolist())
+        ],
+        "notes": list(found.provenance.notes),
+    }
+
+
+def tolerance_document(found: "Sequence[Tolerated]") -> Document:
+    """Document of ``chladni tolerance``; each sampling grid has lines of its own."""
+    profile = found[0].check.profile
+    return {
+        "format": "chladni.tolerance/1",
+        "unit": profile.unit,
+        "profile": [
+            {"frequency_hz": frequency_hz, "psd": psd}
+            for frequency_hz, psd in zip(profile.frequency_hz.tolist(), profile.density.tolist(), strict=True)
+        ],
+        "profile_rms": profile.rms(),
+        "upper_db": profile.upper_db,
+        "lower_db": profile.lower_db,
+        "channels": [
+            {
+                "name": channel.name,
+                "rms": finite(float(one.check.rms[row])),
+                "outside": finite(float(one.check.outside[row])),
+                "std_db": finite(float(one.check.std_db[row])),
+                "frequency_hz": plain(one.check.frequency_hz),
+                "deviation_db": plain(one.check.deviation_db[row]),
+            }
+            for one in found
+            for row, channel in enumerate(one.check.channels)
+        ],
+        "notes": [note for one in found for note in one.density.provenance.notes],
+    }
+
+
+def zoom_document(found: Sequence[AmplitudeSpectrum]) -> Document:
+    """Document of ``chladni zoom``; all sampling grids have the same lines."""
+    return {
+        "format": "chladni.zoom/1",
+        "frequency_hz": plain(found[0].frequency_hz),
+        "quantity": found[0].quantity,
+        "window": found[0].provenance.window,
+        "channels": [
+            {"name": channel.name, "unit": channel.unit, "amplitude": plain(one.values[row])}
+            for one in found
+            for row, channel in enumerate(one.channels)
+        ],
+        "notes": list(dict.fromkeys(note for one in found for note in one.provenance.notes)),
     }
 
 

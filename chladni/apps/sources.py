@@ -31,6 +31,13 @@ def no_progress(share: float) -> None:
     """Tell nobody how far it is."""
 
 
+def moving_channels(series: TimeSeries) -> list[str]:
+    """Names of the channels that show more than one value."""
+    lowest = np.fmin.reduce(series.values, axis=1, initial=np.inf)
+    highest = np.fmax.reduce(series.values, axis=1, initial=-np.inf)
+    return [one.name for one, low, high in zip(series.channels, lowest, highest, strict=True) if low < high]
+
+
 class Watched:
     """Passes blocks on, and remembers which channels moved at all, by how much, and how far it is."""
 

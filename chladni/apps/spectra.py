@@ -2,18 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chladni.apps.excitation import excitation_names, stored_functions
-from chladni.apps.sources import Progress, Span, Watched, no_progress, on_one_grid, watched_grids
+from chladni.apps.sources import Progress, Span, Watched, moving_channels, no_progress, on_one_grid, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.io.source import SeriesLike, are_numbers, driven_series, log_or_series
 from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
+from chladni.signals.deflection_shapes import DeflectionShapes
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -23,8 +24,10 @@ from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import rounded_up
 from chladni.spectral.adaptive import adaptive_auto_spectra, adaptive_cross_spectra
+from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum
 from chladni.spectral.bands import band_rms, total_rms
 from chladni.spectral.blocks import Source
+from chladni.spectral.deflection import deflection_shapes
 from chladni.spectral.excitation import HAMMER_RANGE
 from chladni.spectral.frequency_response import Estimator, frequency_response
 from chladni.spectral.peaks import judged_above_hz
@@ -33,6 +36,7 @@ from chladni.spectral.products import PAIRS
 from chladni.spectral.response_advice import longest_segment_s
 from chladni.spectral.segmentation import SHORTEST_SEGMENT
 from chladni.spectral.windows import Window
+from chladni.spectral.zoom import zoom_spectrum
 
 SpectraT = TypeVar("SpectraT", CrossSpectra, PowerSpectralDensity)
 
@@ -282,6 +286,58 @@ def transfer(
         )
     except EstimateError as error:
         raise EstimateError(f"{source.path.name}: {error}") from error
+
+
+def log_deflection(
+    log: Log,
+    *,
+    reference: str,
+    channels: Sequence[str] | None,
+    frequencies_hz: Sequence[float] | None,
+    averaging: Averaging,
+    span: Span,
+    progress: Progress = no_progress,
+) -> DeflectionShapes:
+    """Give the deflection shapes of named channels, or of all that share the reference's sampling grid and change.
+
+    Raises
+    ------
+    LogError
+        When there is no such channel.
+    EstimateError
+        As `deflection_shapes` does.
+    """
+    references = log.names([reference])
+    names = None if channels is None else tuple(dict.fromkeys((*references, *channels)))
+    grid = _grid_of(log, references, names, span, progress)
+    try:
+        spectra = averaging.spectra(grid, references)
+        _require_moving(grid, references)
+        spectra = without_constant(spectra, grid, keep=references)
+        spectra = replace(spectra, provenance=spectra.provenance.with_notes(*grid.notes))
+        return deflection_shapes(spectra, references=references[0], frequencies_hz=frequencies_hz)
+    except EstimateError as error:
+        raise EstimateError(f"{log.path.name}: {error}") from error
+
+
+def zoomed(log: Log, *, channels: Sequence[str] | None, span: Span, **options: Any) -> tuple[AmplitudeSpectrum, ...]:
+    """Zoom into named channels, or all that change, one value for each sampling grid; options are `zoom_spectrum`'s.
+
+    Raises
+    ------
+    LogError
+        When there is no such channel.
+    EstimateError
+        As `zoom_spectrum` does.
+    """
+    groups = log.read_groups(channels, start_s=span.start_s, end_s=span.end_s)
+    if channels is None:
+        kept = [moving_channels(one) for one in groups]
+        groups = tuple(one.select(names) for one, names in zip(groups, kept, strict=True) if names) or groups
+    try:
+        return tuple(zoom_spectrum(one, **options) for one in groups)
+    except EstimateError as error:
+        raise EstimateError(f"{log.path.name}: {error}") from error
 
 
 def _told_excitations(source: Log | TimeSeries, span: Span) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from chladni.cli.blind import blind
 from chladni.cli.cepstrum import cepstrum
 from chladni.cli.compare import compare
 from chladni.cli.convert import convert
+from chladni.cli.delay import delay
 from chladni.cli.demo import demo
 from chladni.cli.envelope import envelope
 from chladni.cli.excite import excite
@@ -27,9 +28,14 @@ from chladni.cli.info import info
 from chladni.cli.levels import levels
 from chladni.cli.modes import modes
 from chladni.cli.octaves import octaves
+from chladni.cli.ods import ods
+from chladni.cli.orders import orders
 from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
+from chladni.cli.srs import srs
+from chladni.cli.tolerance import tolerance
 from chladni.cli.view import view
+from chladni.cli.zoom import zoom
 from chladni.signals.errors import ChladniError, LogError
 from chladni.signals.visible import visible, visible_lines
 from chladni.signals.wording import counted
@@ -54,6 +60,12 @@ for command in (
     cepstrum,
     frf,
     modes,
+    srs,
+    orders,
+    ods,
+    delay,
+    tolerance,
+    zoom,
     view,
     compare,
     convert,

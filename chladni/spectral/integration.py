@@ -1,19 +1,22 @@
 """Acceleration to velocity to displacement, and back, in time and in frequency."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from chladni.io.source import SeriesLike, series_of
 from chladni.signals.arrays import Real
+from chladni.signals.channel import Names
 from chladni.signals.errors import EstimateError
+from chladni.signals.filtered_series import FilteredSeries
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import differentiated, integrated
-from chladni.signals.value import Value
+from chladni.spectral.filters import filter_runs
 
 # How long the band limit rings: that many periods of low_hz (or of the room up to Nyquist) from an end of a run, its
 # influence has fallen under 1.5 %; the tests confirm it.
@@ -22,44 +25,34 @@ EDGE_PERIODS = 3.0
 Gain = Callable[[Real], NDArray[np.complexfloating]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ConvertedMotion(Value):
-    """A motion computed from another one, and where it can be trusted.
-
-    Attributes
-    ----------
-    series
-        The result, with its unit; runs too short for the band are NaN and marked invalid.
-    band_hz
-        Lowest and highest frequency that pass unchanged.
-    edge_s
-        Time at each end of each unbroken run in which the result leans on what was before or after it.
-    notes
-        The same in sentences.
-    """
-
-    series: TimeSeries
-    band_hz: tuple[float, float]
-    edge_s: float
-    notes: tuple[str, ...] = ()
-
-
-def integrate(series: TimeSeries, *, low_hz: float, times: int = 1) -> ConvertedMotion:
+def integrate(
+    source: SeriesLike,
+    *,
+    low_hz: float,
+    times: int = 1,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> FilteredSeries:
     """Integrate motions over time: acceleration to velocity, twice to displacement.
 
     Parameters
     ----------
-    series
-        Motions, such as m/s^2; `TimeSeries.select` them first.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        motions, such as m/s^2.
     low_hz
         Lowest frequency that passes unchanged, above 0: the slow drift of a sensor would otherwise outgrow the motion
         as 1/omega. Between ``low_hz / 2`` and `low_hz` the gain falls to zero along a raised cosine.
     times
         How often to integrate, at least 1.
+    channels, sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
-    ConvertedMotion
+    FilteredSeries
         Without phase shift. Each unbroken run is freed of its straight-line trend and integrated by itself; nothing
         is carried over invalid samples.
 
@@ -74,8 +67,9 @@ def integrate(series: TimeSeries, *, low_hz: float, times: int = 1) -> Converted
     -----
     Division of the run's spectrum by (j omega)^times, exact below the Nyquist frequency, where a running sum is wrong
     by (omega dt)^2 / 12. What lies beyond the ends is unknown: of a tone of frequency f, integrated n times, the ends
-    leave a drift near `low_hz`, at `edge_s` up to 1.5 % of the tone's result times (f / low_hz)^(n - 1), and falling.
+    leave a drift near `low_hz`, at ``edges_s`` up to 1.5 % of the tone's result times (f / low_hz)^(n - 1).
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     _require_times(times)
     nyquist_hz = series.sample_rate_hz / 2
     if not 0 < low_hz < nyquist_hz:
@@ -90,30 +84,44 @@ def integrate(series: TimeSeries, *, low_hz: float, times: int = 1) -> Converted
 
     # Mirrored evenly: an odd mirror image would shift the mean by twice the end's value, which integration turns
     # into a drift.
-    values = _each_run(series, edge_s=edge_s, run=lambda x: _filtered(_detrended(x), series, edge_s, gain, "even"))
+    def run(x: Real) -> Real:
+        return _filtered(_detrended(x), series, edge_s, gain, "even")
+
     note = (
         f"integrated {times}x above {low_hz:g} Hz (nothing passes below {low_hz / 2:g} Hz); the first and last "
         f"{edge_s:g} s of each run depend on what is outside it"
     )
-    return _converted(series, values, times=-times, band_hz=(low_hz, nyquist_hz), edge_s=edge_s, notes=(note,))
+    return _converted(series, run, times=-times, band_hz=(low_hz, nyquist_hz), edge_s=edge_s, notes=(note,))
 
 
-def differentiate(series: TimeSeries, *, high_hz: float | None = None, times: int = 1) -> ConvertedMotion:
+def differentiate(
+    source: SeriesLike,
+    *,
+    high_hz: float | None = None,
+    times: int = 1,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> FilteredSeries:
     """Differentiate motions over time: displacement to velocity, twice to acceleration.
 
     Parameters
     ----------
-    series
-        Motions, such as m.
+    source
+        A log, the path to one, a series, or an array ``[channel, sample]``:
+        motions, such as m.
     high_hz
         Highest frequency that passes unchanged, default 80 % of half the sample rate: noise grows as omega. Above it
         the gain falls to zero at half the sample rate along a raised cosine.
     times
         How often to differentiate, at least 1.
+    channels, sample_rate_hz, start_s, end_s
+        Which samples, see `cross_spectra`.
 
     Returns
     -------
-    ConvertedMotion
+    FilteredSeries
         Without phase shift; nothing is carried over invalid samples.
 
     Raises
@@ -123,6 +131,7 @@ def differentiate(series: TimeSeries, *, high_hz: float | None = None, times: in
     SetupError
         When a unit has no derivative, such as N.
     """
+    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     _require_times(times)
     nyquist_hz = series.sample_rate_hz / 2
     high_hz = 0.8 * nyquist_hz if high_hz is None else high_hz
@@ -135,9 +144,11 @@ def differentiate(series: TimeSeries, *, high_hz: float | None = None, times: in
         return passed * (2j * np.pi * frequency_hz) ** times
 
     # Mirrored oddly: the slope goes on across the end, and the slope is what is wanted.
-    values = _each_run(series, edge_s=edge_s, run=lambda x: _filtered(x, series, edge_s, gain, "odd"))
+    def run(x: Real) -> Real:
+        return _filtered(x, series, edge_s, gain, "odd")
+
     note = f"differentiated {times}x below {high_hz:g} Hz; each run's first and last {edge_s:.3g} s are uncertain"
-    return _converted(series, values, times=times, band_hz=(0.0, high_hz), edge_s=edge_s, notes=(note,))
+    return _converted(series, run, times=times, band_hz=(0.0, high_hz), edge_s=edge_s, notes=(note,))
 
 
 def integrate_density(density: PowerSpectralDensity, *, low_hz: float = 0.0, times: int = 1) -> PowerSpectralDensity:
@@ -178,39 +189,15 @@ def _scaled_density(density: PowerSpectralDensity, *, low_hz: float, times: int)
 
 def _converted(
     series: TimeSeries,
-    values: Real,
+    run: Callable[[Real], Real],
     *,
     times: int,
     band_hz: tuple[float, float],
     edge_s: float,
     notes: tuple[str, ...],
-) -> ConvertedMotion:
-    valid = np.isfinite(values)
-    before = values.size if series.valid is None else int(series.valid.sum())
-    lost = before - int(valid.sum())
-    if lost:
-        notes += (f"{lost} samples in runs shorter than {2 * edge_s:g} s were left out: too short for the band",)
-    channels = tuple(replace(c, unit=_unit(c.unit, times), overload=None) for c in series.channels)
-    result = replace(series, values=values, channels=channels, valid=None if valid.all() else valid)
-    return ConvertedMotion(series=result, band_hz=band_hz, edge_s=edge_s, notes=notes)
-
-
-def _each_run(series: TimeSeries, *, edge_s: float, run: Callable[[Real], Real]) -> Real:
-    """Apply `run` to every unbroken run of valid samples that is longer than its two edges; NaN elsewhere."""
-    shortest = int(np.ceil(2 * edge_s * series.sample_rate_hz))
-    result = np.full(series.values.shape, np.nan)
-    valid = np.ones(series.values.shape, dtype=bool) if series.valid is None else series.valid
-    for row in range(len(series.channels)):
-        # Each channel by itself: a gap in one sensor is no reason to cut another one's record.
-        edges = np.flatnonzero(np.diff(valid[row], prepend=False, append=False))
-        for first, last in zip(edges[::2], edges[1::2], strict=True):
-            if last - first >= shortest:
-                result[row, first:last] = run(series.values[row, first:last].astype(np.float64))
-    if not np.isfinite(result).any():
-        raise EstimateError(
-            f"no unbroken run lasts {2 * edge_s:g} s, which this band needs; widen the band or take a longer log"
-        )
-    return result
+) -> FilteredSeries:
+    channels = tuple(replace(c, unit=_unit(c.unit, times)) for c in series.channels)
+    return filter_runs(series, run, edges_s=(edge_s, edge_s), band_hz=band_hz, channels=channels, notes=notes)
 
 
 def _detrended(x: Real) -> Real:

@@ -4,26 +4,39 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from chladni.io.source import SeriesLike
+from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.unit_text import in_unit
+from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.frequency_response import frequency_response
 
 
 def transmissibility(
-    spectra: CrossSpectra, *, reference: str, responses: str | Sequence[str] | None = None
+    source: CrossSpectra | SeriesLike,
+    *,
+    references: str,
+    responses: Names | None = None,
+    resolution_hz: float | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
 ) -> FrequencyResponse:
     """Estimate how motion passes from one point to others, T = response/reference.
 
     Parameters
     ----------
-    spectra
-        Averaged cross-spectra that hold the motions.
-    reference
+    source
+        Averaged cross-spectra that hold the motions; or a log, the path to one, a series or an array
+        ``[channel, sample]``, whose cross-spectra are averaged after Welch first.
+    references
         Name of the channel at the point where the motion comes from.
     responses
         Names of the channels it goes to; None takes every other channel in the reference's unit.
+    resolution_hz, sample_rate_hz, start_s, end_s
+        Of samples: how they are averaged, see `cross_spectra`.
 
     Returns
     -------
@@ -41,24 +54,35 @@ def transmissibility(
     -----
     T1 = G_ref,resp / G_ref,ref: H1 with a motion as its reference, and with the random error of H1.
     """
-    unit = spectra.channels[spectra.index(reference)].unit
-    if responses is None:
-        chosen = [c.name for c in spectra.channels if c.unit == unit and c.name != reference]
+    if isinstance(source, CrossSpectra):
+        spectra = source
     else:
-        chosen = [responses] if isinstance(responses, str) else list(responses)
+        spectra = cross_spectra(
+            source,
+            channels=None if responses is None else dict.fromkeys((references, *as_names(responses))),
+            resolution_hz=resolution_hz,
+            sample_rate_hz=sample_rate_hz,
+            start_s=start_s,
+            end_s=end_s,
+        )
+    unit = spectra.channels[spectra.index(references)].unit
+    if responses is None:
+        chosen = [c.name for c in spectra.channels if c.unit == unit and c.name != references]
+    else:
+        chosen = list(as_names(responses))
     if not chosen:
         raise EstimateError(
-            f"no channel but {reference!r} is {in_unit(unit)}; transmissibility needs two in one unit"
+            f"no channel but {references!r} is {in_unit(unit)}; transmissibility needs two in one unit"
         )
     # Checked before arithmetic: a ratio of velocity to acceleration is 1/omega in disguise.
     for name in chosen:
         other = spectra.channels[spectra.index(name)].unit
         if other != unit:
             raise EstimateError(
-                f"{name!r} is {in_unit(other)}, {reference!r} {in_unit(unit)}: transmissibility needs one unit; "
+                f"{name!r} is {in_unit(other)}, {references!r} {in_unit(unit)}: transmissibility needs one unit; "
                 "integrate or differentiate one of them, or ask for a frequency response"
             )
-    response = frequency_response(spectra, references=reference, responses=chosen)
+    response = frequency_response(spectra, references=references, responses=chosen)
     return replace(response, provenance=response.provenance.with_estimator("T1"))
 
 
@@ -84,4 +108,4 @@ def transmissibility_along(spectra: CrossSpectra, *, path: Sequence[str]) -> tup
     """
     if len(path) < 2:
         raise EstimateError(f"a path needs two channels or more, got {len(path)}")
-    return tuple(transmissibility(spectra, reference=near, responses=far) for near, far in pairwise(path))
+    return tuple(transmissibility(spectra, references=near, responses=far) for near, far in pairwise(path))

@@ -102,6 +102,7 @@ def plain(document: Any) -> Any:
         ("frf", ("--reference", "force", "--response", "tip")),
         ("modes", ("--band", 40, 80)),
         ("modes", ("--operational", "--channel", "tip")),
+        ("srs", ("--q", 25)),
     ],
 )
 def test_the_answer_is_that_of_a_log_made_of_it(
@@ -230,7 +231,10 @@ def test_a_model_is_driven_by_a_data_file(run: Run, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "command",
-    ["info", "levels", "psd", "octaves", "envelope", "cepstrum", "frf", "modes", "view", "compare", "gap", "convert"],
+    [
+        *("info", "levels", "psd", "octaves", "envelope", "cepstrum", "frf", "modes", "srs"),
+        *("view", "compare", "gap", "convert"),
+    ],
 )
 def test_a_rate_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command: str) -> None:
     _bare(measured(), tmp_path / "bare.csv")
@@ -251,7 +255,7 @@ def test_a_rate_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command
 
 
 @pytest.mark.parametrize(
-    "command", ["info", "levels", "psd", "octaves", "envelope", "cepstrum", "frf", "modes", "view"]
+    "command", ["info", "levels", "psd", "octaves", "envelope", "cepstrum", "frf", "modes", "srs", "view"]
 )
 def test_a_time_unit_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command: str) -> None:
     series = measured()
@@ -290,7 +294,7 @@ def test_what_is_not_read_is_told_by_every_command(run: Run, tmp_path: Path) -> 
     write_uff(measured(), tmp_path / "records.uff")
     path = tmp_path / "a.uff"
     path.write_bytes((tmp_path / "records.uff").read_bytes() + text_set(kind=9).encode())
-    for command in (*SPECTRA, "info", "frf", "modes"):
+    for command in (*SPECTRA, "info", "frf", "modes", "srs"):
         outcome = run(command, path)
         assert outcome.code == 0, outcome.err
         assert "power spectral density (1): not read" in " ".join(outcome.out.split())
@@ -339,7 +343,7 @@ def test_functions_are_compared(run: Run, functions: Path) -> None:
     assert {one["fate"] for one in outcome.document["response_peaks"]} == {"unchanged"}
 
 
-@pytest.mark.parametrize("command", [*SPECTRA, "gap", "convert", "modes"])
+@pytest.mark.parametrize("command", [*SPECTRA, "srs", "gap", "convert", "modes"])
 def test_commands_for_samples_say_what_the_file_holds(
     run: Run, functions: Path, tmp_path: Path, command: str
 ) -> None:

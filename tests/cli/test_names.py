@@ -105,6 +105,12 @@ def commands(path: Path, folder: Path) -> Iterator[tuple[object, ...]]:
     yield "octaves", path, "--figures", folder
     yield "cepstrum", path, "--figures", folder
     yield "envelope", path, "--band", 20, 40, "--figures", folder
+    yield "orders", path, "--ridge", motion, "--order", 1, "--figures", folder
+    yield "ods", path, "--reference", motion, "--frequency", 30, "--figures", folder
+    yield "delay", path, "--reference", force, "--response", motion, "--figures", folder
+    yield "zoom", path, "--band", 10, 50, "--channel", motion, "--figures", folder
+    yield "tolerance", path, "1:1", "50:1", "--unit", "1", "--channel", motion, "--figures", folder
+    yield "srs", path, "--channel", motion, "--figures", folder
     yield "frf", path, "--reference", force, "--response", motion
     yield ("modes", path, "--reference", force, "--channel", motion, "--count", 1, "--csv", folder / "m.csv",
            "--report", folder / "modes.html", "--save", folder / "m.rrd", "--uff", folder / "m.uff")  # fmt: skip

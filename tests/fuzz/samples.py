@@ -282,10 +282,12 @@ def log_command(path: Path, rng: random.Random) -> list[str]:
     """Any command that takes a log or a data file."""
     rate = ["--rate", "100"] if path.suffix == ".npy" else []
     measured = ("levels", "psd", "octaves", "envelope", "cepstrum")
-    name = rng.choice((*measured, "info", "modes", "compare", "convert"))
+    name = rng.choice((*measured, "info", "modes", "srs", "tolerance", "zoom", "compare", "convert"))
     json_file = ["--json", str(path.with_name("out.json"))] if rng.random() < 0.5 else []
     more = {
         "modes": ["--operational"],
+        "tolerance": ["1:1", "20:1"],
+        "zoom": ["--band", "1", "20"],
         "compare": [str(path)],
         "convert": [str(path.with_name(rng.choice(("out.mcap", "out.csv", "out.uff", "out.mat"))))],
     }

@@ -12,6 +12,9 @@ from chladni.signals.testing import assert_close
 
 RATE_HZ = 500.0
 MODE_HZ = 60.0
+SHAFT = chladni.Rotation(
+    time_s=np.array([0.0, 20.0]), revolutions=np.array([0.0, 400.0]), start_time_ns=0, source="speed"
+)
 VERBS = {
     "psd": chladni.psd,
     "cross_spectra": chladni.cross_spectra,
@@ -20,6 +23,20 @@ VERBS = {
     "coherence": partial(chladni.coherence, references="x"),
     "frf": partial(chladni.frf, references="x"),
     "identify_modes": partial(chladni.identify_modes, references="x"),
+    "lowpass": partial(chladni.lowpass, high_hz=50.0),
+    "highpass": partial(chladni.highpass, low_hz=50.0),
+    "bandpass": partial(chladni.bandpass, band_hz=(20.0, 50.0)),
+    "bandstop": partial(chladni.bandstop, band_hz=(20.0, 50.0)),
+    "srs": chladni.srs,
+    "rotation": partial(chladni.rotation, ridge="y"),
+    "order_map": partial(chladni.order_map, rotation=SHAFT),
+    "order_cuts": partial(chladni.order_cuts, rotation=SHAFT),
+    "deflection_shapes": partial(chladni.deflection_shapes, references="x", frequencies_hz=[MODE_HZ]),
+    "transmissibility": partial(chladni.transmissibility, references="x"),
+    "cross_correlation": partial(chladni.cross_correlation, references="x"),
+    "time_delay": partial(chladni.time_delay, references="x"),
+    "zoom_spectrum": partial(chladni.zoom_spectrum, band_hz=(50.0, 70.0)),
+    "probability_density": chladni.probability_density,
 }
 
 

@@ -27,7 +27,7 @@ def times_s(seconds=40.0):
 
 
 def inner(result):
-    edge = int(np.ceil(result.edge_s * RATE_HZ))
+    edge = int(np.ceil(result.edges_s[0] * RATE_HZ))
     return slice(edge, -edge)
 
 

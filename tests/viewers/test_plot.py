@@ -35,6 +35,15 @@ def modes():
     return chladni.ModeSet.from_arrays([1.0, 2.0], [[1.0, 0.5, 0.2], [1.0, -0.5, 0.1]], names=["a", "b", "c"])
 
 
+def acceleration():
+    return series().select(["a", "b"])
+
+
+def shaft():
+    t = np.arange(400) / 20.0
+    return chladni.Rotation(time_s=t, revolutions=10 * t, start_time_ns=0, source="speed")
+
+
 # Value, and the axes of its figure: parts, and colour scales beside them.
 VALUES = {
     "series": (lambda: series(), 2),
@@ -52,6 +61,25 @@ VALUES = {
     "envelope": (lambda: chladni.envelope(series(), channels="a", band_hz=(20.0, 80.0))[0], 1),
     "kurtogram": (lambda: chladni.kurtogram(series(), channels="a"), 2),
     "cepstrum": (lambda: chladni.cepstrum(series(), channels="a"), 1),
+    "filtered": (lambda: chladni.lowpass(series(), high_hz=20.0, channels="a"), 1),
+    "shock": (lambda: chladni.srs(series(), channels="a"), 1),
+    "order map": (lambda: chladni.order_map(series(), shaft(), channels="a"), 2),
+    "order cuts": (lambda: chladni.order_cuts(series(), shaft(), channels="a"), 2),
+    "rotation": (lambda: shaft(), 1),
+    "correlation": (lambda: chladni.cross_correlation(series(), references="f", responses="a"), 1),
+    "delays": (lambda: chladni.time_delay(series(), references="f", responses="a"), 1),
+    "deflection": (lambda: chladni.deflection_shapes(acceleration(), references="a", frequencies_hz=[20.0]), 1),
+    "zoom": (lambda: chladni.zoom_spectrum(series(), band_hz=(10.0, 20.0), channels="a"), 1),
+    "profile": (lambda: chladni.random_profile([(5, 0.1), (50, 0.2)]), 1),
+    "profile check": (
+        lambda: chladni.check_profile(chladni.psd(acceleration()), chladni.random_profile([(5, 0.1), (50, 0.2)])),
+        1,
+    ),
+    "probability": (lambda: chladni.probability_density(series()), 1),
+    "vibration response": (
+        lambda: chladni.vibration_response(chladni.psd(acceleration()), frequencies_hz=[10.0, 20.0]),
+        1,
+    ),
 }
 
 

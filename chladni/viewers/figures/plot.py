@@ -13,29 +13,43 @@ from matplotlib.figure import Figure
 
 from chladni.models.core.reading import Chart, InfluenceTable, InstrumentReading
 from chladni.models.core.simulation import Simulation
+from chladni.signals.arrays import Real
 from chladni.signals.cepstrum import Cepstrum
 from chladni.signals.coherence import Coherence
+from chladni.signals.cross_correlation import CrossCorrelation, TimeDelays
+from chladni.signals.deflection_shapes import DeflectionShapes
 from chladni.signals.envelope import EnvelopeSpectrum, Kurtogram
 from chladni.signals.errors import SetupError
+from chladni.signals.filtered_series import FilteredSeries
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.levels import Levels, OctaveLevels, Severity
 from chladni.signals.modal_assurance import ModalAssurance
 from chladni.signals.mode_set import ModeSet
+from chladni.signals.order_spectra import OrderCuts, OrderMap
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.random_vibration import ProbabilityDensity, VibrationResponse
+from chladni.signals.shock_response import ShockResponse
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.value import Value
 from chladni.signals.waterfall import Waterfall
+from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum
 from chladni.viewers.drawing import thin
 from chladni.viewers.figures import (
+    amplitude,
     cepstrum,
+    correlation,
+    deflection,
     density,
     envelope,
     frequency_response,
     influence,
     levels,
     octaves,
+    orders,
+    random_vibration,
+    shock,
     waterfall,
 )
 from chladni.viewers.figures.chart import chart_height_in, draw_chart
@@ -273,6 +287,106 @@ def _(value: ModalAssurance) -> list[Picture]:
 
 
 @pictures.register
+def _(value: FilteredSeries) -> list[Picture]:
+    return pictures(value.series)
+
+
+@pictures.register
+def _(value: ShockResponse) -> list[Picture]:
+    style = Style.of_channels(value.channels)
+    return [
+        Picture(
+            (Part(shock.HEIGHT_IN, partial(shock.draw_shock, response=value, group=group, style=style)),),
+            shock.X_LABEL,
+        )
+        for group in groups(value.channels)
+    ]
+
+
+@pictures.register
+def _(value: OrderMap) -> list[Picture]:
+    labels = Style.of_channels(value.channels).labels
+    return [
+        Picture(
+            (Part(orders.MAP_IN, partial(orders.draw_order_map, found=value, row=row, label=labels[channel.name])),),
+            orders.along(value)[1],
+        )
+        for row, channel in enumerate(value.channels)
+    ]
+
+
+@pictures.register
+def _(value: OrderCuts) -> list[Picture]:
+    drawn = zip(orders.CUTS_IN, (orders.draw_order_sizes, orders.draw_order_phases), strict=True)
+    parts = [(height_in, draw) for height_in, draw in drawn]
+    return [
+        Picture(
+            tuple(Part(height_in, partial(draw, cuts=value, row=row)) for height_in, draw in parts),
+            orders.along(value)[1],
+        )
+        for row in range(len(value.channels))
+    ]
+
+
+@pictures.register
+def _(value: CrossCorrelation) -> list[Picture]:
+    return _correlations(value, np.full(len(value.responses), np.nan))
+
+
+@pictures.register
+def _(value: TimeDelays) -> list[Picture]:
+    return _correlations(value.correlation, value.delay_s)
+
+
+def _correlations(found: CrossCorrelation, delays_s: Real) -> list[Picture]:
+    parts = tuple(
+        Part(correlation.HEIGHT_IN, partial(_draw_correlation, found=found, row=row, delay_s=delay_s))
+        for row, delay_s in enumerate(delays_s.tolist())
+    )
+    return [Picture(parts, plain(f"Lag after {found.reference.name} [s]"))]
+
+
+@pictures.register
+def _(value: DeflectionShapes) -> list[Picture]:
+    return [
+        Picture(
+            tuple(
+                Part(deflection.HEIGHT_IN, partial(_draw_deflection, found=value, group=group, row=row))
+                for row in range(value.frequency_hz.size)
+            )
+        )
+        for group in groups(value.channels, size=len(value.channels))
+    ]
+
+
+@pictures.register
+def _(value: AmplitudeSpectrum) -> list[Picture]:
+    style = Style.of_channels(value.channels)
+    draw = partial(amplitude.draw_amplitudes, found=value, style=style)
+    return [
+        Picture((Part(amplitude.HEIGHT_IN, partial(draw, group=group)),), "Frequency [Hz]")
+        for group in groups(value.channels)
+    ]
+
+
+@pictures.register
+def _(value: ProbabilityDensity) -> list[Picture]:
+    style = Style.of_channels(value.channels)
+    draw = partial(random_vibration.draw_probability, found=value, style=style)
+    return [Picture((Part(random_vibration.HEIGHT_IN, draw),), "Deviation from the mean [standard deviations]")]
+
+
+@pictures.register
+def _(value: VibrationResponse) -> list[Picture]:
+    style = Style.of_channels(value.channels)
+    draw = partial(random_vibration.draw_vibration_response, found=value, style=style)
+    return [
+        Picture((Part(random_vibration.HEIGHT_IN, partial(draw, group=group)),), "Natural frequency [Hz]")
+        for group in groups(value.channels)
+    ]
+
+
+@pictures.register
 def _(value: Simulation) -> list[Picture]:
     return [*pictures(value.outputs), *pictures(value.inputs)]
 
@@ -358,6 +472,21 @@ def _draw_assurance(axes: Axes, found: ModalAssurance) -> None:
     )
     draw_mac(axes, found.values, rows=rows, columns=columns)
     axes.set_ylabel("Mode of a: Hz")
+
+
+def _draw_correlation(axes: Axes, found: CrossCorrelation, row: int, delay_s: float) -> None:
+    correlation.draw_correlation(axes, found, row, delay_s)
+    axes.set_title(plain(found.responses[row].name), loc="left", pad=2)
+    axes.set_ylabel("Correlation")
+
+
+def _draw_deflection(axes: Axes, found: DeflectionShapes, group: Group, row: int) -> None:
+    labels = Style.of_channels(found.channels).labels
+    deflection.draw_deflection(axes, found, group, row)
+    deflection.name_channels(axes, [plain(labels[found.channels[column].name]) for column in group.rows])
+    axes.set_ylabel(f"RMS [{printed_unit(group.unit)}]")
+    if row == 0:
+        legend(axes, above_points=10.0)
 
 
 def _draw_lines(axes: Axes, value: Value) -> None:

@@ -1,0 +1,62 @@
+"""Time delays between the channels of a log."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from chladni.apps.sources import Span, joined, moving_channels
+from chladni.io.log import Log
+from chladni.signals.cross_correlation import TimeDelays
+from chladni.signals.errors import EstimateError
+from chladni.signals.time_series import TimeSeries
+from chladni.spectral.delay import time_delay
+
+
+def log_delays(
+    log: Log,
+    *,
+    reference: str,
+    responses: Sequence[str] | None,
+    band_hz: tuple[float, float] | None,
+    longest_delay_s: float | None,
+    resolution_hz: float | None,
+    span: Span,
+) -> TimeDelays:
+    """Tell by how much named channels come after a reference, or all of its unit that share its sampling grid.
+
+    Arguments are those of `time_delay`; named channels of several sampling grids are joined, with a note.
+
+    Raises
+    ------
+    LogError
+        When there is no such channel.
+    EstimateError
+        As `time_delay` does.
+    """
+    (first,) = log.names([reference])
+    notes: tuple[str, ...] = ()
+    if responses is None:
+        series = _of_its_unit(log, first, span)
+    else:
+        series, notes = joined(log, list(dict.fromkeys([first, *log.names(responses)])), span)
+    try:
+        found = time_delay(
+            series,
+            references=first,
+            band_hz=band_hz,
+            longest_delay_s=longest_delay_s,
+            resolution_hz=resolution_hz,
+        )
+    except EstimateError as error:
+        raise EstimateError(f"{log.path.name}: {error}") from error
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def _of_its_unit(log: Log, reference: str, span: Span) -> TimeSeries:
+    for series in log.read_groups(None, start_s=span.start_s, end_s=span.end_s):
+        names = [channel.name for channel in series.channels]
+        if reference in names:
+            unit = series.channels[names.index(reference)].unit
+            # A channel that never changes has no delay.
+            others = [name for name in moving_channels(series) if series.channels[names.index(name)].unit == unit]
+            return series.select(list(dict.fromkeys((reference, *others))))
+    return log.read([reference], start_s=span.start_s, end_s=span.end_s)

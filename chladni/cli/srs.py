@@ -1,0 +1,105 @@
+"""``chladni srs``: what a shock does to what it shakes."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from chladni.cli import options
+from chladni.cli.opening import Opener, opens_files
+from chladni.cli.output import Output
+from chladni.cli.places import require_places
+from chladni.cli.words import number, unit
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from chladni.signals.shock_response import ShockResponse
+
+
+@opens_files
+def srs(
+    log: options.Log,
+    *,
+    channel: options.Channels = None,
+    q: Annotated[
+        float, typer.Option("--q", metavar="Q", help="Amplification at resonance: 10 is 5 % damping.")
+    ] = 10.0,
+    quantity: Annotated[
+        Literal["absolute-acceleration", "relative-displacement", "pseudo-velocity"],
+        typer.Option(help="The response of the oscillators that is judged."),
+    ] = "absolute-acceleration",
+    band: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            metavar="LO HI",
+            help="Natural frequencies, in Hz; from one over the log's length to a tenth of the rate if not given.",
+            show_default=False,
+        ),
+    ] = None,
+    lines: Annotated[int, typer.Option(metavar="N", help="Natural frequencies an octave.")] = 12,
+    offset: Annotated[
+        Literal["first", "median", "keep"],
+        typer.Option(help="What is taken off, so that oscillators begin at rest: first sample, median, nothing."),
+    ] = "first",
+    start: options.Start = None,
+    end: options.End = None,
+    opener: Opener,
+    json: options.Json = None,
+    figures: options.Figures = None,
+) -> None:
+    """Shock response spectra: the largest response of oscillators of every frequency."""
+    from chladni.apps.documents import shock_document
+    from chladni.apps.findings import reading_sentences
+    from chladni.apps.shock import shock_responses
+    from chladni.apps.sources import Span
+
+    require_places(reads=[log, opener.setup], writes={"--json": json}, folders={"--figures": figures})
+    out = Output(json)
+    with opener(log) as opened:
+        found = shock_responses(
+            opened,
+            channels=channel,
+            span=Span(start_s=start, end_s=end),
+            q=q,
+            quantity=quantity,
+            band_hz=band,
+            lines_an_octave=lines,
+            offset=offset,
+        )
+        told = reading_sentences(opened, everything=channel is None)
+    for one in found:
+        _print_highest(out, one)
+    out.lines((*told, *(note for one in found for note in one.notes)))
+    if figures is not None:
+        _save_figures(out, found, figures)
+    out.json(shock_document(found))
+
+
+def _print_highest(out: Output, found: "ShockResponse") -> None:
+    lines, rows = found.maximax.argmax(axis=1), range(len(found.channels))
+    low_hz, high_hz = (number(float(found.frequency_hz[end])) for end in (0, -1))
+    out.table(
+        f"Shock response, {found.quantity.replace('-', ' ')}, Q = {number(found.q)}, from {low_hz} to {high_hz} Hz",
+        ["channel", "maximax", "at [Hz]", "positive", "negative", "unit", "taken off first"],
+        [
+            [
+                found.channels[row].name,
+                number(float(found.maximax[row, lines[row]])),
+                number(float(found.frequency_hz[lines[row]])),
+                number(float(found.positive[row].max())),
+                number(float(found.negative[row].max())),
+                unit(found.channels[row].unit),
+                number(float(found.offset[row])),
+            ]
+            for row in rows
+        ],
+    )
+
+
+def _save_figures(out: Output, found: "Sequence[ShockResponse]", folder: Path) -> None:
+    from chladni.viewers.figures import Album, save_album
+    from chladni.viewers.figures.shock import shock_figures
+
+    for path in save_album(Album({"srs": shock_figures(found)}), folder):
+        out.line(f"figure: {path}")

@@ -1,0 +1,109 @@
+"""Correlation against SciPy, and delays against noise that is shifted by known times."""
+
+import numpy as np
+import pytest
+from scipy.signal import correlate
+
+from chladni.signals.errors import EstimateError
+from chladni.spectral.delay import cross_correlation, time_delay
+from tests.spectral.made_signals import noise, series
+
+RATE_HZ = 1000.0
+
+
+def delayed(x, delay_s):
+    """Shift a periodic record by any time, exactly."""
+    frequency_hz = np.fft.rfftfreq(x.size, 1 / RATE_HZ)
+    spectrum = np.fft.rfft(x) * np.exp(-2j * np.pi * frequency_hz * delay_s)
+    return np.fft.irfft(spectrum, x.size)
+
+
+def smooth_noise(samples, seed=0):
+    """Noise up to 300 Hz: nothing at half the sample rate, where a shift can't be told."""
+    spectrum = np.fft.rfft(noise(1, samples, seed=seed)[0])
+    spectrum[np.fft.rfftfreq(samples, 1 / RATE_HZ) > 300] = 0
+    return np.fft.irfft(spectrum, samples)
+
+
+def test_coefficients_are_those_of_scipy():
+    x = noise(3, 500)
+    found = cross_correlation(series(x, rate_hz=RATE_HZ), references="b", responses=["a", "c"], longest_lag_s=0.2)
+    centred = x - x.mean(axis=1, keepdims=True)
+    for row, other in enumerate((0, 2)):
+        expected = correlate(centred[other], centred[1], method="direct")[299:700]
+        expected /= np.sqrt(np.sum(centred[other] ** 2) * np.sum(centred[1] ** 2))
+        np.testing.assert_allclose(found.values[row], expected, atol=1e-12)
+    assert found.lag_s[0] == -0.2
+    assert [channel.name for channel in found.responses] == ["a", "c"]
+
+
+def test_a_record_is_its_own_image_at_no_lag():
+    x = noise(1, 1000)[0]
+    found = cross_correlation(series(np.stack([x, -2 * x]), rate_hz=RATE_HZ), references="a")
+    assert found.values[0].min() == pytest.approx(-1)
+    assert found.lag_s[found.values[0].argmin()] == 0
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.0123456, -0.2, 0.00037])
+@pytest.mark.parametrize("sign", [1.0, -3.0])
+def test_a_delay_is_found_between_samples_within_its_error(delay_s, sign):
+    x = smooth_noise(30_000)
+    late = sign * delayed(x, delay_s) + 0.3 * noise(1, x.size, seed=9)[0]
+    found = time_delay(series(np.stack([x, late]), rate_hz=RATE_HZ), references="a", longest_delay_s=0.5)
+    assert found.inverted == (sign < 0,)
+    assert abs(found.delay_s[0] - delay_s) < 4 * found.std_s[0]
+    assert 0 < found.std_s[0] < 2e-5
+    assert found.notes == ()
+
+
+def test_the_error_bar_is_the_scatter():
+    x = smooth_noise(8000)
+    noisy = [delayed(x, 0.01) + 0.5 * noise(1, x.size, seed=20 + trial)[0] for trial in range(40)]
+    one = series(np.stack([x, *noisy]), rate_hz=RATE_HZ, names=[f"c{row}" for row in range(41)], units=["m/s^2"] * 41)
+    found = time_delay(one, references="c0", longest_delay_s=0.05)
+    # A standard deviation of 40 trials scatters by 1/sqrt(80): three of them, and as much for the bars' own scatter.
+    assert np.std(found.delay_s) / found.std_s.mean() == pytest.approx(1, abs=0.4)
+
+
+def test_a_band_without_the_disturbance_tells_the_delay_that_the_whole_does_not():
+    x = smooth_noise(30_000)
+    loud = 30 * np.sin(2 * np.pi * 50 * np.arange(x.size) / RATE_HZ)
+    pair = series(np.stack([x + loud, delayed(x, 0.007) + np.roll(loud, 3)]), rate_hz=RATE_HZ)
+    found = time_delay(pair, references="a", band_hz=(100.0, 250.0), longest_delay_s=0.1)
+    assert found.delay_s[0] == pytest.approx(0.007, abs=1e-5)
+    whole = time_delay(pair, references="a", longest_delay_s=0.1)
+    assert "the delay may be that one" in whole.notes[0]
+
+
+def test_a_resonance_is_no_delay_and_is_told():
+    x = smooth_noise(30_000)
+    ratio = np.fft.rfftfreq(x.size, 1 / RATE_HZ) / 80
+    swinging = np.fft.irfft(np.fft.rfft(x) / (1 - ratio**2 + 0.1j * ratio), x.size)
+    found = time_delay(series(np.stack([x, swinging]), rate_hz=RATE_HZ), references="a", longest_delay_s=0.1)
+    assert "resonances or several paths: choose a band without" in found.notes[-1]
+    assert found.std_s[0] > 1e-5
+
+
+def test_over_a_gap_nothing_is_correlated():
+    x = smooth_noise(12_000)
+    pair = np.stack([x, delayed(x, 0.02)])
+    pair[1, 3000:3100] = np.nan
+    found = time_delay(series(pair, rate_hz=RATE_HZ), references="a", longest_delay_s=0.1, band_hz=(10.0, 250.0))
+    assert found.delay_s[0] == pytest.approx(0.02, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"references": "z"}, "no channel 'z'"),
+        ({"references": "a", "responses": "a"}, "no channel but a is there"),
+        ({"references": "a", "band_hz": (300.0, 100.0)}, "isn't one within 0 to 500 Hz"),
+        ({"references": "a", "longest_delay_s": 60.0}, "must lie within the record, 4 s without a gap"),
+        ({"references": "a", "longest_delay_s": 0.0}, "the longest lag is 0 s"),
+        ({"references": "a", "responses": "c"}, "c never changes"),
+    ],
+)
+def test_what_has_no_delay_is_refused(options, words):
+    x = np.stack([*noise(2, 4000), np.ones(4000)])
+    with pytest.raises(EstimateError, match=words):
+        time_delay(series(x, rate_hz=RATE_HZ), **({"responses": "b"} | options))
