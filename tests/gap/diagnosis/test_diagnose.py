@@ -32,7 +32,7 @@ PERIOD, PERIODS = 2000, 3
 
 @pytest.fixture(scope="module")
 def friction() -> Diagnosis:
-    return diagnose(arm(), [measured((FRICTION,))])
+    return diagnose(arm(), [measured((FRICTION,), seconds=5.0)])
 
 
 @pytest.mark.slow

@@ -46,6 +46,7 @@ def test_a_slip_of_a_factor_of_ten_is_found_with_its_right_value(name: str, fact
     assert last.screened < 1.2 < location.tuned.chi
 
 
+@pytest.mark.nightly
 def test_of_two_slips_the_second_is_found_beside_the_first() -> None:
     location, tunables = located({"j0.stiffness": 5.0, "j2.stiffness": 0.2})
     one, both = wrong_values(location, tunables)[:2]
