@@ -32,7 +32,7 @@ def found_wrong(tunables, z) -> dict[str, float]:
         ("j1.stiffness", 10.0),
         pytest.param("j1.stiffness", 0.1, marks=pytest.mark.nightly),
         pytest.param("j0.stiffness", 3.0, marks=pytest.mark.nightly),
-        pytest.param("j2.damping", 10.0, marks=pytest.mark.slow),
+        pytest.param("j2.damping", 10.0, marks=pytest.mark.nightly),
         pytest.param("b1.mass", 10.0, marks=pytest.mark.nightly),
     ],
 )
