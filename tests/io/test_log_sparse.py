@@ -92,7 +92,7 @@ def test_all_topics_count_together(tmp_path: Path) -> None:
     ),
     fields=st.sampled_from([1, 7, 60]),
 )
-@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 def test_what_is_laid_out_is_bounded_and_the_advice_reads_all(
     tmp_path: Path, bursts: list[tuple[int, int]], fields: int
 ) -> None:

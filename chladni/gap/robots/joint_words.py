@@ -7,8 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from chladni.gap.robots.motion import rms
 from chladni.gap.robots.term import SENSES, Form, Number, Term, at_row, formed, law, length, units, usual
-from chladni.gap.robots.torques import Torques, rms
+from chladni.gap.robots.torques import Torques
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
 

@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from chladni.gap.robots.torques import LEAST, Torques
+from chladni.gap.robots.motion import LEAST
+from chladni.gap.robots.torques import Torques
 from chladni.robots.dynamics import inertial_numbers, needed_torque
 from chladni.robots.machine import about_centre
 from chladni.robots.robot import Robot

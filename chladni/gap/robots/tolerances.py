@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from chladni.gap.robots.motion import rms
 from chladni.gap.robots.term import at_row, usual
-from chladni.gap.robots.torques import ALL_COMMANDS, Torques, rms
+from chladni.gap.robots.torques import ALL_COMMANDS, Torques
 from chladni.robots.dynamics import inertial_numbers
 from chladni.robots.robot import Robot
 from chladni.signals.arrays import Real

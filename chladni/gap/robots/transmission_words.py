@@ -9,8 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from chladni.gap.robots.motion import rms
 from chladni.gap.robots.term import Number, Term, at_row, formed, length, usual
-from chladni.gap.robots.torques import Torques, rms
+from chladni.gap.robots.torques import Torques
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
 

@@ -46,7 +46,7 @@ def test_what_is_about_a_prefix_is_told_as_one(factor: float, words: str) -> Non
 
 @pytest.mark.slow
 def test_a_log_in_millimetres_is_told_in_the_advice() -> None:
-    log = measured()
+    log = measured(seconds=3.0)
     found = diagnose(arm(), [replace(log, outputs=1e3 * log.outputs)], leave_out=frozenset(CATALOGUE))
     assert found.advice is not None
     assert found.advice.startswith("At acc_")

@@ -32,7 +32,7 @@ def found_wrong(tunables, z) -> dict[str, float]:
         ("j1.stiffness", 10.0),
         pytest.param("j1.stiffness", 0.1, marks=pytest.mark.nightly),
         pytest.param("j0.stiffness", 3.0, marks=pytest.mark.nightly),
-        pytest.param("j2.damping", 10.0, marks=pytest.mark.slow),
+        pytest.param("j2.damping", 10.0, marks=pytest.mark.nightly),
         pytest.param("b1.mass", 10.0, marks=pytest.mark.nightly),
     ],
 )
@@ -46,6 +46,7 @@ def test_a_slip_of_a_factor_of_ten_is_found_with_its_right_value(name: str, fact
     assert last.screened < 1.2 < location.tuned.chi
 
 
+@pytest.mark.nightly
 def test_of_two_slips_the_second_is_found_beside_the_first() -> None:
     location, tunables = located({"j0.stiffness": 5.0, "j2.stiffness": 0.2})
     one, both = wrong_values(location, tunables)[:2]

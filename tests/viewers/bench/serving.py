@@ -81,6 +81,15 @@ def until_drawn(page: Any, count: int) -> int:
     return len(curves(page))
 
 
+def until_back(page: Any, start: list[float]) -> bool:
+    """Wait until the curves are those again, for as long as a busy machine may take; tell whether they are."""
+    for _ in range(200):
+        if curves(page) == start:
+            return True
+        page.wait_for_timeout(25)
+    return False
+
+
 def until_changed(page: Any, before: list[float]) -> list[float]:
     """Wait until some curve differs, for as long as a busy machine may take."""
     for _ in range(200):
