@@ -65,8 +65,13 @@ def walking(seconds: float) -> np.ndarray:
     )
 
 
-def hung(robot: Robot, command: np.ndarray, *, falls: bool = False, stands_s: float = 0.0) -> JointLog:
-    """What a machine logs that hangs from a cord, or falls; that for a time is held at the ends of its calves."""
+def hung(
+    robot: Robot, command: np.ndarray, *, falls: bool = False, stands_s: float = 0.0, effort: bool = False
+) -> JointLog:
+    """What a machine logs that hangs from a cord, or falls; that for a time is held at the ends of its calves.
+
+    With `effort` the log has the drives' torques, too.
+    """
     import mujoco
 
     model, data = robot.model, mujoco.MjData(robot.model)
@@ -76,7 +81,8 @@ def hung(robot: Robot, command: np.ndarray, *, falls: bool = False, stands_s: fl
     data.qpos[places] = command[:, 0]
     mujoco.mj_forward(model, data)
     start = data.xpos[trunk] + [0.0, 0.0, model.body_mass[trunk:].sum() * 9.81 / CORD]
-    position = np.empty_like(command)
+    position, given = np.empty_like(command), np.empty_like(command)
+    dofs = [one.dof for one in robot.joints]
     upright, turn, speed = np.array(data.xquat[trunk]), np.zeros(3), np.zeros(6)
     felt = []
     for sample, asked in enumerate(command.T):
@@ -97,12 +103,13 @@ def hung(robot: Robot, command: np.ndarray, *, falls: bool = False, stands_s: fl
                     # A force of a body acts at its centre of mass.
                     data.xfrc_applied[body.id] = [*push, *np.cross(arm, push)]
             mujoco.mj_step(model, data)
+            given[:, sample] = data.qfrc_actuator[dofs]
             felt.append(data.sensordata.copy())
     # An IMU gives the mean about each of its samples: commands that step would be seen just after a step.
     half = every // 2
     sums = np.cumsum([felt[0]] * half + felt + [felt[-1]] * half, axis=0)
     sensed = (sums[every::every] - sums[:-every:every]).T / every
-    log = joint_log_of(robot, position, command=command)
+    log = joint_log_of(robot, position, command=command, effort=given if effort else None)
     imu = ImuLog(
         topic="/imu",
         site="imu",

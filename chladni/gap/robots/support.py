@@ -74,7 +74,7 @@ def _shares(torques: Torques, spans: Sequence[slice]) -> Real:
     felt[base.dof : base.dof + 3] = held[:3] + np.array(model.opt.gravity)[:, None]
     regressor = needed_torque(robot, torques.all_positions, still, felt).regressor
     columns = np.array([_at_tip(robot, link, torques, regressor) for link in _last_links(robot)])[:, torques.driven]
-    missing, found = torques.missing[torques.driven], np.zeros(len(spans))
+    missing, found = torques.missing[: len(torques.joints)][torques.driven], np.zeros(len(spans))
     for place, span in enumerate(spans):
         if np.sqrt(np.mean(np.sum(held[:3, span] ** 2, axis=0))) < _STANDS * weight:
             continue

@@ -66,6 +66,13 @@ def test_friction_in_a_leg_is_named_with_its_size(tmp_path: Path) -> None:
     assert found.gap.after < 0.5 * found.gap.before
 
 
+def test_friction_is_named_where_the_log_has_commands_and_efforts(tmp_path: Path) -> None:
+    log = hung(biped(tmp_path, "machine/biped.xml", left=' frictionloss="0.4"'), walking(SECONDS), effort=True)
+    found = diagnose_robot(biped(tmp_path), log)
+    assert ("coulomb_friction", "left_hip") in named(found)
+    assert {one.site for one in found.causes} == {"left_hip"}
+
+
 def test_a_delay_of_all_commands(tmp_path: Path) -> None:
     found = found_of(tmp_path, servo=' delay="0.012" nsample="40"')
     assert named(found) == {("delay", "all commands")}
