@@ -35,6 +35,8 @@ _HOME = {
     "cross_spectra": "chladni.spectral.cross_spectra",
     "coherence": "chladni.spectral.coherence",
     "waterfall": "chladni.spectral.waterfall",
+    "levels": "chladni.spectral.levels",
+    "severity": "chladni.spectral.severity",
     "mac": "chladni.modal.shapes.mac",
     "relative_motion": "chladni.modal.shapes.relative_motion",
     "validate": "chladni.modal.shapes.validation",
@@ -60,6 +62,8 @@ _HOME = {
     "Channel": "chladni.signals.channel",
     "Coherence": "chladni.signals.coherence",
     "CrossSpectra": "chladni.signals.cross_spectra",
+    "Levels": "chladni.signals.levels",
+    "Severity": "chladni.signals.levels",
     "FrequencyResponse": "chladni.signals.frequency_response",
     "ModalAssurance": "chladni.signals.modal_assurance",
     "ModeSet": "chladni.signals.mode_set",
@@ -85,6 +89,7 @@ __all__ = [
     "FrequencyDomainDecomposition",
     "FrequencyResponse",
     "HalfPower",
+    "Levels",
     "LogError",
     "ModalAssurance",
     "ModeSet",
@@ -92,6 +97,7 @@ __all__ = [
     "PolyReferenceLeastSquares",
     "PowerSpectralDensity",
     "SetupError",
+    "Severity",
     "Study",
     "TimeSeries",
     "Wish",
@@ -106,6 +112,7 @@ __all__ = [
     "frf",
     "identify_modes",
     "influence",
+    "levels",
     "load_model",
     "load_robot",
     "load_setup",
@@ -117,6 +124,7 @@ __all__ = [
     "plot",
     "psd",
     "relative_motion",
+    "severity",
     "show",
     "simulate",
     "validate",
@@ -167,6 +175,7 @@ if TYPE_CHECKING:
     from chladni.signals.cross_spectra import CrossSpectra
     from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
     from chladni.signals.frequency_response import FrequencyResponse
+    from chladni.signals.levels import Levels, Severity
     from chladni.signals.modal_assurance import ModalAssurance
     from chladni.signals.mode_set import ModeSet
     from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -174,7 +183,9 @@ if TYPE_CHECKING:
     from chladni.signals.time_series import TimeSeries
     from chladni.spectral.coherence import coherence
     from chladni.spectral.cross_spectra import cross_spectra
+    from chladni.spectral.levels import levels
     from chladni.spectral.peaks import find_peaks, find_response_peaks
+    from chladni.spectral.severity import severity
     from chladni.spectral.waterfall import waterfall
 else:
 

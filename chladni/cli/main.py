@@ -22,6 +22,7 @@ from chladni.cli.frf import frf
 from chladni.cli.gap import gap
 from chladni.cli.influence import influence
 from chladni.cli.info import info
+from chladni.cli.levels import levels
 from chladni.cli.modes import modes
 from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
@@ -41,7 +42,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (info, psd, frf, modes, view, compare, convert, simulate, influence, gap, excite, bench, demo):
+for command in (info, levels, psd, frf, modes, view, compare, convert, simulate, influence, gap, excite, bench, demo):
     app.command()(command)
 app.add_typer(blind)
 

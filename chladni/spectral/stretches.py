@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
 
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
-from chladni.spectral.segmentation import Segmentation
+from chladni.spectral.segmentation import SHORTEST_SEGMENT, Segmentation
 
 Run = tuple[int, int]
 
@@ -41,6 +42,38 @@ def run_lengths(blocks: Sequence[TimeSeries]) -> list[int]:
         end_ns = block.start_time_ns + round(block.samples / block.sample_rate_hz * NS_PER_S)
         open_end = bool(runs) and runs[-1][1] == block.samples
     return lengths
+
+
+class Runs:
+    """Finds the runs of samples that are valid in all channels, over the seams of a stream's blocks."""
+
+    def __init__(self) -> None:
+        self._stretch = Stretch(Segmentation(samples=SHORTEST_SEGMENT, hop=1))
+        self._open = False
+
+    @property
+    def longest(self) -> int:
+        """Samples of the longest run so far."""
+        return self._stretch.longest_run
+
+    def pieces(self, block: TimeSeries) -> list[tuple[bool, TimeSeries]]:
+        """Give the valid parts of the next block, each with whether a run begins with it.
+
+        Raises
+        ------
+        EstimateError
+            When the block starts before the last one ended.
+        """
+        runs = valid_runs(block)
+        goes_on = self._open and not self._stretch.breaks_at(block.start_time_ns, block.sample_rate_hz)
+        self._stretch.extend(block, runs)
+        self._open = bool(runs) and runs[-1][1] == block.samples
+        return [(not (goes_on and first == 0), _part(block, first, last)) for first, last in runs]
+
+
+def _part(block: TimeSeries, first: int, last: int) -> TimeSeries:
+    start_ns = block.start_time_ns + round(first / block.sample_rate_hz * NS_PER_S)
+    return replace(block, values=block.values[:, first:last], valid=None, start_time_ns=start_ns)
 
 
 class Stretch:

@@ -120,6 +120,10 @@ def _channels(study: Study) -> Iterator[Channel]:
         yield from density.channels
     for waterfall in study.waterfalls:
         yield from waterfall.channels
+    for levels in study.levels:
+        yield from levels.channels
+    for severity in study.severities:
+        yield from severity.channels
     if study.response is not None:
         yield from (*study.response.references, *study.response.responses)
     if study.modes is not None:
@@ -129,3 +133,5 @@ def _channels(study: Study) -> Iterator[Channel]:
 def _starts(study: Study) -> Iterator[int]:
     yield from (series.start_time_ns for series in study.series)
     yield from (waterfall.start_time_ns for waterfall in study.waterfalls)
+    yield from (levels.running.start_time_ns for levels in study.levels)
+    yield from (severity.running.start_time_ns for severity in study.severities)

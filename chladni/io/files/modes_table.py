@@ -71,8 +71,8 @@ def write_modes_csv(
     shapes = table.with_name(f"{table.stem}_shapes{table.suffix}")
     # Both appear, or neither.
     with atomic_path(table, overwrite=overwrite) as first, atomic_path(shapes, overwrite=overwrite) as second:
-        _write(first, _MODE_COLUMNS, _mode_rows(modes, validation))
-        _write(second, _SHAPE_COLUMNS, _shape_rows(modes))
+        write_table(first, _MODE_COLUMNS, _mode_rows(modes, validation))
+        write_table(second, _SHAPE_COLUMNS, _shape_rows(modes))
     return table, shapes
 
 
@@ -81,22 +81,22 @@ def _mode_rows(modes: ModeSet, validation: ModeValidation | None) -> Iterable[li
         scale, spread = modes.scale, modes.spread
         yield [
             str(row + 1),
-            _number(modes.frequency_hz[row]),
-            _number(modes.frequency_std_hz[row]),
-            _number(modes.damping_ratio[row]),
-            _number(modes.damping_std[row]),
-            "" if scale is None else _number(scale.modal_mass[row]),
-            "" if scale is None else _number(scale.modal_mass_std[row]),
+            number_text(modes.frequency_hz[row]),
+            number_text(modes.frequency_std_hz[row]),
+            number_text(modes.damping_ratio[row]),
+            number_text(modes.damping_std[row]),
+            "" if scale is None else number_text(scale.modal_mass[row]),
+            "" if scale is None else number_text(scale.modal_mass_std[row]),
             "" if spread is None else str(spread.orders[row]),
-            "" if validation is None else _number(validation.mpc[row]),
-            "" if validation is None else _number(validation.mpd_deg[row]),
-            "" if validation is None else _number(validation.mean_phase_deg[row]),
+            "" if validation is None else number_text(validation.mpc[row]),
+            "" if validation is None else number_text(validation.mpd_deg[row]),
+            "" if validation is None else number_text(validation.mean_phase_deg[row]),
         ]
 
 
 def _shape_rows(modes: ModeSet) -> Iterable[list[str]]:
     for row in range(modes.frequency_hz.size):
-        start = [str(row + 1), _number(modes.frequency_hz[row])]
+        start = [str(row + 1), number_text(modes.frequency_hz[row])]
         for column, channel in enumerate(modes.channels):
             component, std = modes.shapes[row, column], modes.shape_std[row, column]
             direction = channel.direction or (float("nan"),) * 3
@@ -104,21 +104,23 @@ def _shape_rows(modes: ModeSet) -> Iterable[list[str]]:
                 *start,
                 cell_text(channel.name),
                 cell_text(channel.point or ""),
-                *(_number(one) for one in direction),
-                _number(component.real),
-                _number(std.real),
-                _number(component.imag),
-                _number(std.imag),
-                _number(abs(component)),
+                *(number_text(one) for one in direction),
+                number_text(component.real),
+                number_text(std.real),
+                number_text(component.imag),
+                number_text(std.imag),
+                number_text(abs(component)),
             ]
 
 
-def _write(path: Path, columns: Sequence[str], rows: Iterable[list[str]]) -> None:
+def write_table(path: Path, columns: Sequence[str], rows: Iterable[list[str]]) -> None:
+    """Write a table as RFC 4180 has it, one header line first."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(rows)
 
 
-def _number(number: float) -> str:
+def number_text(number: float) -> str:
+    """Give a number with all its digits, nothing where it isn't known."""
     return f"{float(number):.17g}" if isfinite(number) else ""

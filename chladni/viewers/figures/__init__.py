@@ -8,6 +8,7 @@ from chladni.viewers.figures.comparison import comparison_figures
 from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.frequency_response import response_figures
+from chladni.viewers.figures.levels import level_figures
 from chladni.viewers.figures.mac import cross_mac_figure, mac_figures
 from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
@@ -24,6 +25,7 @@ __all__ = [
     "complexity_figures",
     "cross_mac_figure",
     "density_figures",
+    "level_figures",
     "mac_figures",
     "mode_shape_figures",
     "nyquist_figures",

@@ -9,6 +9,7 @@ from chladni.signals.study import Study
 from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.frequency_response import response_figures
+from chladni.viewers.figures.levels import level_figures
 from chladni.viewers.figures.mac import mac_figures
 from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
@@ -39,6 +40,7 @@ class Album:
         return cls(
             {
                 "waveforms": waveform_figures(study),
+                "levels": level_figures(study),
                 "densities": density_figures(study),
                 "responses": response_figures(study),
                 "nyquist": nyquist_figures(study),

@@ -38,6 +38,7 @@ def _sections(album: Album) -> dict[str, list[tuple[str, str]]]:
             "synthesis", "Error: root of the squares that the modes leave over those of the measured function."
         ),
         "Frequency responses": [(name, masked) for pair in pairs for name in pair],
+        "Levels": captioned("levels", "Solid: RMS of each window. Pale: its peak about the mean."),
         "Power spectral densities": captioned("densities", f"One-sided. {_SIGMA}"),
         "Waterfalls": captioned("waterfalls", "Grey: samples are missing."),
         "Waveforms": captioned("waveforms", "Long records are drawn by the extremes of each stretch."),

@@ -1,0 +1,134 @@
+"""``chladni levels``: how strong, how peaked, how severe."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from chladni.cli import options
+from chladni.cli.opening import Opener, opens_files
+from chladni.cli.output import Output
+from chladni.cli.places import require_places
+from chladni.cli.words import number, unit, with_error
+
+if TYPE_CHECKING:
+    from chladni.signals.levels import Levels, Severity
+
+MachineName = Literal["large-rigid", "large-flexible", "medium-rigid", "medium-flexible"]
+
+
+@opens_files
+def levels(
+    log: options.Log,
+    *,
+    channel: options.Channels = None,
+    band: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="LO HI", help="Levels between these frequencies, in Hz.", show_default=False),
+    ] = None,
+    running: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Windows of running levels; 0.125 s if not given.", show_default=False),
+    ] = None,
+    machine: Annotated[
+        MachineName | None,
+        typer.Option(
+            help="Class and foundation, for the zone of ISO 20816-3; large is above 300 kW.", show_default=False
+        ),
+    ] = None,
+    slow: Annotated[
+        bool, typer.Option("--slow", help="The machine turns slower than 600 r/min: severity from 2 Hz on.")
+    ] = False,
+    start: options.Start = None,
+    end: options.End = None,
+    opener: Opener,
+    json: options.Json = None,
+    csv: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv", help="Write the levels as a table.", show_default=False)
+    ] = None,
+    figures: options.Figures = None,
+    report: options.Report = None,
+) -> None:
+    """RMS, peak, crest factor, skewness, kurtosis, and vibration severity in mm/s."""
+    from chladni.apps.findings import reading_sentences
+    from chladni.apps.levels import levels_document, measure_levels
+    from chladni.apps.sources import Span
+    from chladni.signals.study import Study
+
+    require_places(
+        reads=[log, opener.setup],
+        writes={"--json": json, "--csv": csv, "--report": report},
+        folders={"--figures": figures},
+    )
+    out = Output(json)
+    with opener(log) as opened, out.progress(log.name) as progress:
+        found = measure_levels(
+            opened,
+            channels=channel,
+            bands_hz=None if band is None else [band],
+            running_s=running,
+            machine=machine,
+            slow=slow,
+            span=Span(start_s=start, end_s=end),
+            progress=progress,
+        )
+        told = reading_sentences(opened, everything=channel is None)
+    for one in found.levels:
+        _print_levels(out, one)
+    for judged in found.severities:
+        _print_severity(out, judged)
+    out.lines((*told, *found.notes))
+    if csv is not None:
+        from chladni.io.files.levels_table import write_levels_csv
+
+        out.line(f"table: {write_levels_csv(csv, found.levels, found.severities)}")
+    study = Study(title=log.name, levels=found.levels, severities=found.severities, findings=(*told, *found.notes))
+    out.pictures(study, figures=figures, report=report)
+    out.json(levels_document(found))
+
+
+def _print_levels(out: Output, found: "Levels") -> None:
+    for column, (low_hz, high_hz) in enumerate(found.bands_hz):
+        out.table(
+            f"Levels about the mean, {number(low_hz)} to {number(high_hz)} Hz",
+            ["channel", "RMS", "unit", "mean", "peak", "peak to peak", "crest factor", "skewness", "kurtosis"],
+            [
+                [
+                    channel.name,
+                    with_error(float(found.rms[row, column]), float(found.rms_std[row, column])),
+                    unit(channel.unit),
+                    *(
+                        number(float(one[row, column]))
+                        for one in (
+                            found.mean,
+                            found.peak,
+                            found.peak_to_peak,
+                            found.crest_factor,
+                            found.skewness,
+                            found.kurtosis,
+                        )
+                    ),
+                ]
+                for row, channel in enumerate(found.channels)
+            ],
+        )
+
+
+def _print_severity(out: Output, found: "Severity") -> None:
+    zoned = ["zone"] if found.zones else []
+    limits = ", ".join(
+        f"{pair} {limit:g}" for pair, limit in zip(("A/B", "B/C", "C/D"), found.boundaries_mm_s, strict=False)
+    )
+    by = f", zones of ISO 20816-3 for {found.machine}: {limits} mm/s" if found.zones else ""
+    out.table(
+        f"Vibration severity, velocity RMS from {number(found.band_hz[0])} to {number(found.band_hz[1])} Hz{by}",
+        ["channel", "velocity RMS [mm/s]", *zoned],
+        [
+            [
+                channel.name,
+                with_error(float(found.velocity_mm_s[row]), float(found.velocity_std_mm_s[row])),
+                *found.zones[row : row + 1],
+            ]
+            for row, channel in enumerate(found.channels)
+        ],
+    )

@@ -1,0 +1,327 @@
+"""Levels of a series or a stream of blocks: RMS, peak, crest factor, skewness and kurtosis, over all and running."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from chladni.signals.arrays import Index, Mask, Real, Whole
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.levels import Levels, RunningLevels
+from chladni.signals.number_range import require_in_range
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.spectral.accumulator import require_finite
+from chladni.spectral.band_filter import BandFilter
+from chladni.spectral.blocks import Source, leading_part
+from chladni.spectral.stretches import valid_runs
+
+# Time constant "fast" of sound and vibration level meters (IEC 61672-1:2013, section 5.8).
+FAST_S = 0.125
+# Below it a window tells no kurtosis: its scatter, sqrt(24 / n), is then above 0.6 for Gaussian noise.
+LEAST_SAMPLES = 64
+# More windows than this a picture has no room for; two neighbours then become one.
+MOST_WINDOWS = 1024
+# Of the record, to tell the scatter of its RMS.
+BATCHES = 32
+
+
+def levels(
+    source: Source,
+    *,
+    bands_hz: Sequence[tuple[float, float]] | None = None,
+    running_s: float | None = None,
+    integrations: int = 0,
+) -> Levels:
+    """Measure levels: RMS, peak, peak-to-peak, crest factor, skewness and kurtosis.
+
+    Parameters
+    ----------
+    source
+        A series, or consecutive blocks of one (taken one at a time, so memory doesn't grow with the log).
+    bands_hz
+        Edges of bands; None for all that was sampled, without a filter. See `BandFilter` for what passes.
+    running_s
+        Length of the windows of running levels; None for 0.125 s, or 64 samples where that is longer. Neighbours are
+        joined two by two until at most 1024 windows are left.
+    integrations
+        How often motions are integrated first: 1 gives levels of velocity from acceleration. Needs bands above 0 Hz.
+
+    Returns
+    -------
+    Levels
+        ``[channel, band]``. Without bands each channel counts all its valid samples; a band takes those that are
+        valid in all channels, less the filter's reach at the ends of each run.
+
+    Raises
+    ------
+    EstimateError
+        When there is no sample, a band isn't inside the spectrum, or no run is long enough for its filter.
+    SetupError
+        When a unit has no integral.
+
+    Notes
+    -----
+    Moments are merged exactly over windows and blocks (Pébay 2008, Sandia report SAND2008-6212, eq. 2.1 to 2.9). One
+    sigma of the RMS comes from the scatter of the mean squares of up to 32 parts of the record.
+
+    Examples
+    --------
+    >>> t = np.arange(8000) / 1000
+    >>> sine = 3.0 + 2.0 * np.sin(2 * np.pi * 25 * t)
+    >>> x = TimeSeries(values=sine[np.newaxis], sample_rate_hz=1000.0, channels=(Channel(name="a", unit="m/s^2"),))
+    >>> found = levels(x)
+    >>> [float(one[0, 0].round(6)) for one in (found.mean, found.rms, found.peak, found.kurtosis)]
+    [3.0, 1.414214, 2.0, 1.5]
+    """
+    lead, blocks = leading_part(source, 1)
+    first = lead[0]
+    accumulator = LevelsAccumulator(
+        first.channels, first.sample_rate_hz, bands_hz=bands_hz, running_s=running_s, integrations=integrations
+    )
+    for block in blocks:
+        accumulator.update(block)
+    return accumulator.result()
+
+
+class LevelsAccumulator:
+    """Running measure of levels, see `levels`; mutable, the result is a frozen value."""
+
+    def __init__(
+        self,
+        channels: Sequence[Channel],
+        sample_rate_hz: float,
+        *,
+        bands_hz: Sequence[tuple[float, float]] | None = None,
+        running_s: float | None = None,
+        integrations: int = 0,
+    ) -> None:
+        if bands_hz is None and integrations:
+            raise EstimateError("integration needs a band that begins above 0 Hz; below it a drift has no end")
+        if bands_hz is not None and not bands_hz:
+            raise EstimateError("no band is given; name one, or leave bands out for all that was sampled")
+        if running_s is not None and not LEAST_SAMPLES / sample_rate_hz <= running_s < float("inf"):
+            raise EstimateError(
+                f"windows of {running_s:g} s are too short or no length; {LEAST_SAMPLES} samples, "
+                f"{LEAST_SAMPLES / sample_rate_hz:.3g} s, are the least"
+            )
+        self.channels = tuple(channels)
+        self.sample_rate_hz = sample_rate_hz
+        self._filters = [BandFilter(sample_rate_hz, band, integrations=integrations) for band in bands_hz or ()]
+        window = max(LEAST_SAMPLES, round((running_s or FAST_S) * sample_rate_hz))
+        self._windows = [_Windows(len(self.channels), window) for _ in range(max(1, len(self._filters)))]
+        self._start_ns: int | None = None
+        self._passed = self.channels
+
+    def update(self, block: TimeSeries) -> None:
+        """Take in the next block; `EstimateError` when it has other channels, or starts before the last one ended."""
+        if block.channels != self.channels or block.sample_rate_hz != self.sample_rate_hz:
+            raise EstimateError("blocks of a measure of levels need the same channels and rate; resample them first")
+        self._start_ns = block.start_time_ns if self._start_ns is None else self._start_ns
+        for filter_, windows in zip(self._filters, self._windows, strict=False):
+            for passed in filter_.feed(block):
+                self._add(windows, passed)
+        if not self._filters:
+            for name in (channel.name for channel in block.channels):
+                alone = block.select([name])
+                require_finite(alone, valid_runs(alone))
+            self._add(self._windows[0], block)
+
+    def result(self) -> Levels:
+        """Give the levels; no more blocks may follow."""
+        for filter_, windows in zip(self._filters, self._windows, strict=False):
+            for passed in filter_.rest():
+                self._add(windows, passed)
+        if not any(windows.moments.samples.any() for windows in self._windows):
+            raise EstimateError("no sample is a number (all are marked invalid); leave the channels out")
+        samples = max(windows.samples for windows in self._windows)
+        for windows in self._windows:
+            windows.coarsen(samples)
+        whole = _stacked([windows.whole() for windows in self._windows])
+        require_in_range(self.channels, whole.largest[..., 0].max(axis=1))
+        one = _Moments._make(array[..., 0] for array in whole)
+        return Levels(
+            channels=self._passed,
+            bands_hz=tuple(one.band_hz for one in self._filters) or ((0.0, self.sample_rate_hz / 2),),
+            samples=one.samples.astype(np.int64),
+            mean=np.where(one.samples > 0, one.mean, np.nan),
+            rms=one.rms,
+            rms_std=np.stack([windows.rms_std() for windows in self._windows], axis=1),
+            peak=one.peak,
+            peak_to_peak=np.where(one.samples > 0, one.high - one.low, np.nan),
+            crest_factor=_ratio(one.peak, one.rms),
+            skewness=one.skewness,
+            kurtosis=one.kurtosis,
+            running=self._running(samples),
+            notes=tuple(map(_edge_note, self._filters)),
+        )
+
+    def _add(self, windows: "_Windows", series: TimeSeries) -> None:
+        start_s = (series.start_time_ns - (self._start_ns or 0)) / NS_PER_S
+        windows.add(series, round(start_s * self.sample_rate_hz))
+        self._passed = series.channels
+
+    def _running(self, samples: int) -> RunningLevels:
+        numbers = np.unique(np.concatenate([windows.number for windows in self._windows]))
+        moments = _stacked([windows.at(numbers) for windows in self._windows])
+        return RunningLevels(
+            window_s=samples / self.sample_rate_hz,
+            time_s=(numbers + 0.5) * samples / self.sample_rate_hz,
+            rms=moments.rms,
+            peak=moments.peak,
+            kurtosis=moments.kurtosis,
+            start_time_ns=self._start_ns or 0,
+        )
+
+
+def _edge_note(one: BandFilter) -> str:
+    return (
+        f"band {one.band_hz[0]:g} to {one.band_hz[1]:g} Hz: the first and last {one.reach_s:.3g} s of each unbroken "
+        "run are not judged, since the filter leans on what is outside"
+    )
+
+
+class _Windows:
+    """Moments of consecutive windows of a stream; neighbours are joined when there are too many."""
+
+    def __init__(self, channels: int, samples: int) -> None:
+        self.samples = samples
+        self.number: Whole = np.empty(0, dtype=np.int64)
+        self.moments = _Moments._make(np.empty((len(_Moments._fields), channels, 0)))
+
+    def add(self, series: TimeSeries, first: int) -> None:
+        """Take samples in, the first of which is number `first` of the stream."""
+        if not series.samples:
+            return
+        number = np.arange(first // self.samples, (first + series.samples - 1) // self.samples + 1)
+        starts = np.maximum(number * self.samples - first, 0)
+        fresh = _Moments.of(series.values.astype(np.float64, copy=False), series.valid, starts)
+        self.moments = _Moments.joined([self.moments, fresh], lambda arrays: np.concatenate(arrays, axis=-1))
+        self.number = np.concatenate([self.number, number])
+        self.coarsen(self.samples)
+        while self.number.size > MOST_WINDOWS:
+            self.coarsen(2 * self.samples)
+
+    def coarsen(self, samples: int) -> None:
+        """Join windows to those of so many samples, a multiple of what they have."""
+        number = self.number * self.samples // samples
+        starts = np.flatnonzero(np.diff(number, prepend=-1))
+        if starts.size < number.size:
+            self.moments, number = self.moments.grouped(starts), number[starts]
+        self.number, self.samples = number, samples
+
+    def whole(self) -> "_Moments":
+        """Give the moments of all windows together, as one."""
+        return self.moments.grouped(np.zeros(1, dtype=np.intp))
+
+    def at(self, numbers: Whole) -> "_Moments":
+        """Give windows of these numbers; those that hold no sample are empty."""
+        place = np.minimum(np.searchsorted(self.number, numbers), self.number.size - 1)
+        there = self.number[place] == numbers
+        return _Moments._make(np.where(there, array[..., place], 0.0) for array in self.moments)
+
+    def rms_std(self) -> Real:
+        """Give ``[channel]`` one sigma of the RMS, by the scatter of the mean squares of parts of the record."""
+        edges = np.linspace(0, self.number.size, min(self.number.size, BATCHES) + 1).astype(np.intp)
+        parts, whole = self.moments.grouped(edges[:-1]), self.whole()
+        known = parts.samples > 0
+        power = (parts.squares / np.maximum(parts.samples, 1)) + (parts.mean - whole.mean) ** 2
+        weight = parts.samples / np.maximum(whole.samples, 1)
+        apart = np.where(known, weight * (power - whole.rms**2), 0.0)
+        number = known.sum(axis=-1)
+        variance = (apart**2).sum(axis=-1) * number / np.maximum(number - 1, 1)
+        # d sqrt(P) = dP / (2 sqrt(P)).
+        std = np.sqrt(variance) / (2 * np.maximum(whole.rms[:, 0], np.finfo(np.float64).tiny))
+        return np.asarray(np.where(number > 1, std, np.inf), dtype=np.float64)
+
+
+class _Moments(NamedTuple):
+    """Count, mean, sums of powers of deviations from the mean, and extremes: ``[..., window]`` each."""
+
+    samples: Real
+    mean: Real
+    squares: Real
+    cubes: Real
+    fourths: Real
+    low: Real
+    high: Real
+
+    @classmethod
+    def of(cls, values: Real, valid: Mask | None, starts: Index) -> Self:
+        """Take ``[channel, sample]`` in windows that begin at `starts`."""
+        lengths = np.diff(starts, append=values.shape[1])
+        low = np.minimum.reduceat(_or(values, valid, np.inf), starts, axis=1)
+        high = np.maximum.reduceat(_or(values, valid, -np.inf), starts, axis=1)
+        if valid is None:
+            count = np.broadcast_to(lengths.astype(np.float64), low.shape)
+        else:
+            count = np.add.reduceat(valid, starts, axis=1, dtype=np.float64)
+        mean = np.add.reduceat(_or(values, valid, 0.0), starts, axis=1) / np.maximum(count, 1)
+        # The mean of equal numbers may differ from them by their last bit, which is no motion.
+        mean = np.where(high > low, mean, np.where(count > 0, low, 0.0))
+        apart = _or(values - np.repeat(mean, lengths, axis=1), valid, 0.0)
+        squared = apart * apart
+        sums = (np.add.reduceat(one, starts, axis=1) for one in (squared, squared * apart, squared * squared))
+        return cls._make((count, mean, *sums, low, high))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self], join: Callable[[Sequence[Real]], Real]) -> Self:
+        """Join several by joining their arrays."""
+        return cls._make(map(join, zip(*parts, strict=True)))
+
+    def grouped(self, starts: Index) -> Self:
+        """Merge windows in groups that begin at `starts`."""
+
+        def total(terms: Real) -> Real:
+            return np.asarray(np.add.reduceat(terms, starts, axis=-1), dtype=np.float64)
+
+        low, high = np.minimum.reduceat(self.low, starts, axis=-1), np.maximum.reduceat(self.high, starts, axis=-1)
+        count = total(self.samples)
+        mean = total(self.samples * self.mean) / np.maximum(count, 1)
+        mean = np.where(high > low, mean, np.where(count > 0, low, 0.0))
+        apart = self.mean - np.repeat(mean, np.diff(starts, append=self.mean.shape[-1]), axis=-1)
+        shifted = self.samples * apart**2
+        squares = total(self.squares + shifted)
+        cubes = total(self.cubes + 3 * apart * self.squares + shifted * apart)
+        fourths = total(self.fourths + 4 * apart * self.cubes + 6 * apart**2 * self.squares + shifted * apart**2)
+        return type(self)(count, mean, squares, cubes, fourths, low, high)
+
+    @property
+    def rms(self) -> Real:
+        """Root mean square about the mean; NaN without samples."""
+        return np.sqrt(_ratio(self.squares, self.samples))
+
+    @property
+    def peak(self) -> Real:
+        """Largest magnitude about the mean; NaN without samples."""
+        return np.where(self.samples > 0, np.maximum(self.high - self.mean, self.mean - self.low), np.nan)
+
+    @property
+    def largest(self) -> Real:
+        """Largest magnitude; 0 without samples."""
+        return np.where(self.samples > 0, np.maximum(np.abs(self.high), np.abs(self.low)), 0.0)
+
+    @property
+    def skewness(self) -> Real:
+        """Third moment about the mean over the cube of the RMS; NaN where nothing moves."""
+        return _ratio(self.cubes / np.maximum(self.samples, 1), self.rms**3)
+
+    @property
+    def kurtosis(self) -> Real:
+        """Fourth moment about the mean over the fourth power of the RMS; NaN where nothing moves."""
+        return _ratio(self.fourths / np.maximum(self.samples, 1), self.rms**4)
+
+
+def _or(values: Real, valid: Mask | None, other: float) -> Real:
+    """Give the values, another one where they aren't valid."""
+    return values if valid is None else np.where(valid, values, other)
+
+
+def _stacked(bands: Sequence[_Moments]) -> _Moments:
+    """``[channel, band, window]`` of the moments of each band."""
+    return _Moments.joined(bands, lambda arrays: np.stack(arrays, axis=1))
+
+
+def _ratio(numerator: Real, denominator: Real) -> Real:
+    unknown = np.full(numerator.shape, np.nan)
+    return np.asarray(np.divide(numerator, denominator, out=unknown, where=denominator > 0), dtype=np.float64)

@@ -1,0 +1,118 @@
+"""Levels over time: RMS, peak and kurtosis of each channel; severity over the zones of its class."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chladni.signals.arrays import Real
+from chladni.signals.levels import Levels, RunningLevels, Severity
+from chladni.signals.study import Study
+from chladni.signals.time_series import NS_PER_S
+from chladni.viewers.figures.log_axis import logarithmic
+from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
+from chladni.viewers.groups import Group, groups
+from chladni.viewers.labels import printed_unit
+from chladni.viewers.style import Style
+
+HEIGHTS_IN = [2.0, 1.2]
+SEVERITY_HEIGHT_IN = 2.6
+GAUSSIAN_KURTOSIS = 3.0
+PEAK_OPACITY = 0.45
+# From green to red, so pale that lines read on all of them.
+ZONE_COLOURS = ("#e3f3e6", "#f6f6d8", "#fdebd3", "#fbdcdc")
+# Above what is shown, so that a quiet machine's zone is seen with the boundary above it.
+HEADROOM = 1.15
+
+
+def level_figures(study: Study) -> dict[str, Figure]:
+    """Draw running levels, one figure for each band and group of channels of one unit, by name; and severities.
+
+    Solid lines are RMS, pale ones peaks, each about the mean of its window.
+    """
+    style = Style.of(study)
+    with look():
+        return {
+            f"levels {place}.{column} {group.name}": _figure(one, column - 1, group, style)
+            for place, one in enumerate(study.levels, start=1)
+            for column in range(1, len(one.bands_hz) + 1)
+            for group in groups(one.channels)
+        } | {
+            f"severity {place}.{page}": _severity_figure(one, group, style)
+            for place, one in enumerate(study.severities, start=1)
+            for page, group in enumerate(groups(one.channels), start=1)
+        }
+
+
+def _figure(levels: Levels, column: int, group: Group, style: Style) -> Figure:
+    figure, (above, below) = sheet(HEIGHTS_IN, sharex=True)
+    running = levels.running
+    time_s, shown = _time_s(running, style), running.kurtosis[list(group.rows), column]
+    for row in group.rows:
+        channel = levels.channels[row]
+        colour = paint(style.on_light(channel))
+        _line(above, time_s, running.rms[row, column], color=colour, label=plain(style.labels[channel.name]))
+        _line(above, time_s, running.peak[row, column], color=colour, alpha=PEAK_OPACITY, linewidth=0.6)
+        _line(below, time_s, running.kurtosis[row, column], color=colour)
+    low_hz, high_hz = levels.bands_hz[column]
+    above.set_ylim(bottom=0.0)
+    above.set_ylabel(f"RMS, peak [{printed_unit(group.unit)}]")
+    # Never below 1; from single pulses it reaches hundreds.
+    logarithmic(below, 1.0, max(10.0, 1.3 * float(np.nanmax(shown, initial=0.0))))
+    below.axhline(GAUSSIAN_KURTOSIS, color="#777777", linewidth=0.6, linestyle="--")
+    below.set_ylabel("Kurtosis")
+    below.set_xlabel(f"Time [s], windows of {running.window_s:.3g} s, {low_hz:.4g} to {high_hz:.4g} Hz")
+    _span(below, running, style)
+    legend(above)
+    return figure
+
+
+def _severity_figure(severity: Severity, group: Group, style: Style) -> Figure:
+    figure, (axes,) = sheet([SEVERITY_HEIGHT_IN])
+    time_s = _time_s(severity.running, style)
+    top = 0.0
+    for row in group.rows:
+        channel = severity.channels[row]
+        # Levels are in SI; the standard and its readers count in mm/s.
+        rms_mm_s = 1e3 * severity.running.rms[row, 0]
+        top = max(top, float(np.nanmax(rms_mm_s, initial=0.0)))
+        _line(axes, time_s, rms_mm_s, color=paint(style.on_light(channel)), label=plain(style.labels[channel.name]))
+    _zones(axes, severity.boundaries_mm_s, top)
+    axes.set_ylabel("Velocity RMS [mm/s]")
+    axes.set_xlabel(
+        f"Time [s], windows of {severity.running.window_s:.3g} s, "
+        f"{severity.band_hz[0]:.4g} to {severity.band_hz[1]:.4g} Hz"
+    )
+    _span(axes, severity.running, style)
+    legend(axes)
+    return figure
+
+
+def _zones(axes: Axes, boundaries: tuple[float, ...], top: float) -> None:
+    """Colour the zones up to the next boundary above what is shown, and name them."""
+    above = [limit for limit in boundaries if limit > top]
+    limit_mm_s = HEADROOM * (above[0] if above else top or 1.0)
+    axes.set_ylim(0.0, limit_mm_s)
+    if not boundaries:
+        return
+    edges = [0.0, *boundaries, np.inf]
+    for zone, colour, low, high in zip("ABCD", ZONE_COLOURS, edges[:-1], edges[1:], strict=True):
+        if low < limit_mm_s:
+            shown = min(high, limit_mm_s)
+            axes.axhspan(low, shown, color=colour, linewidth=0, zorder=0)
+            axes.text(1.01, (low + shown) / 2, zone, transform=axes.get_yaxis_transform(), va="center")
+
+
+def _time_s(running: RunningLevels, style: Style) -> Real:
+    return running.time_s + (running.start_time_ns - style.origin_ns) / NS_PER_S
+
+
+def _span(axes: Axes, running: RunningLevels, style: Style) -> None:
+    time_s = _time_s(running, style)
+    axes.set_xlim(time_s[0] - running.window_s / 2, time_s[-1] + running.window_s / 2)
+
+
+def _line(axes: Axes, time_s: Real, values: Real, **looks: Any) -> None:
+    # A line needs two points.
+    axes.plot(time_s, values, marker="." if time_s.size == 1 else None, **looks)
