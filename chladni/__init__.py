@@ -37,6 +37,7 @@ _HOME = {
     "waterfall": "chladni.spectral.waterfall",
     "levels": "chladni.spectral.levels",
     "severity": "chladni.spectral.severity",
+    "octaves": "chladni.spectral.octaves",
     "mac": "chladni.modal.shapes.mac",
     "relative_motion": "chladni.modal.shapes.relative_motion",
     "validate": "chladni.modal.shapes.validation",
@@ -63,6 +64,7 @@ _HOME = {
     "Coherence": "chladni.signals.coherence",
     "CrossSpectra": "chladni.signals.cross_spectra",
     "Levels": "chladni.signals.levels",
+    "OctaveLevels": "chladni.signals.levels",
     "Severity": "chladni.signals.levels",
     "FrequencyResponse": "chladni.signals.frequency_response",
     "ModalAssurance": "chladni.signals.modal_assurance",
@@ -94,6 +96,7 @@ __all__ = [
     "ModalAssurance",
     "ModeSet",
     "ModelError",
+    "OctaveLevels",
     "PolyReferenceLeastSquares",
     "PowerSpectralDensity",
     "SetupError",
@@ -118,6 +121,7 @@ __all__ = [
     "load_setup",
     "locate_from_levels",
     "mac",
+    "octaves",
     "open",
     "open_log",
     "optimise",
@@ -175,7 +179,7 @@ if TYPE_CHECKING:
     from chladni.signals.cross_spectra import CrossSpectra
     from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
     from chladni.signals.frequency_response import FrequencyResponse
-    from chladni.signals.levels import Levels, Severity
+    from chladni.signals.levels import Levels, OctaveLevels, Severity
     from chladni.signals.modal_assurance import ModalAssurance
     from chladni.signals.mode_set import ModeSet
     from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -184,6 +188,7 @@ if TYPE_CHECKING:
     from chladni.spectral.coherence import coherence
     from chladni.spectral.cross_spectra import cross_spectra
     from chladni.spectral.levels import levels
+    from chladni.spectral.octaves import octaves
     from chladni.spectral.peaks import find_peaks, find_response_peaks
     from chladni.spectral.severity import severity
     from chladni.spectral.waterfall import waterfall

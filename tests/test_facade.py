@@ -9,12 +9,13 @@ import chladni
 SURFACE = {
     "Channel", "ChladniError", "CircleFit", "Coherence", "CovarianceDrivenSubspace", "CrossSpectra",
     "EnhancedFrequencyDomainDecomposition", "EstimateError", "FrequencyDomainDecomposition",
-    "FrequencyResponse", "HalfPower", "Levels", "LogError", "ModeSet", "ModelError", "PolyReferenceLeastSquares",
+    "FrequencyResponse", "HalfPower", "Levels", "LogError", "ModeSet", "ModelError", "OctaveLevels",
+    "PolyReferenceLeastSquares",
     "PowerSpectralDensity", "SetupError", "Severity", "Study", "TimeSeries", "Wish", "analyse", "attached",
     "coherence", "cross_spectra", "diagnose_gap", "excite",
     "find_peaks", "find_response_peaks", "frf", "identify_modes", "influence", "levels", "load_model", "load_robot",
     "load_setup", "locate_from_levels", "mac",
-    "open", "open_log", "optimise", "psd",
+    "octaves", "open", "open_log", "optimise", "psd",
     "relative_motion", "severity", "show", "simulate", "validate", "waterfall", "write_mcap", "write_model",
 }  # fmt: skip
 HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard", "numba", "panel", "bokeh"}

@@ -46,7 +46,7 @@ class Watched:
         self.names = tuple(names)
         self.notes = notes
         self._blocks = blocks
-        self._duration_s = duration_s
+        self.duration_s = duration_s
         self._progress = progress
         self._lowest: dict[str, float] = {}
         self._highest: dict[str, float] = {}
@@ -58,7 +58,7 @@ class Watched:
             self._watch(block)
             yield block
             done_s += block.duration_s
-            self._progress(min(1.0, done_s / max(self._duration_s, 1e-9)))
+            self._progress(min(1.0, done_s / max(self.duration_s, 1e-9)))
 
     def constant(self) -> tuple[str, ...]:
         """Names of the channels that showed one value only."""

@@ -267,7 +267,7 @@ def transfer(
         spectra = averaging.spectra(grid, references)
         spectra = replace(spectra, provenance=spectra.provenance.with_notes(*grid.notes))
         _require_moving(grid, references)
-        spectra = _without_constant(spectra, grid, keep=(*references, *(named or ())))
+        spectra = without_constant(spectra, grid, keep=(*references, *(named or ())))
         return frequency_response(
             spectra, references=references, responses=named, estimator=estimator, hammer_range=hammer_range
         )
@@ -300,7 +300,7 @@ def _require_moving(watched: Watched, references: Sequence[str]) -> None:
 def _density(source: TimeSeries | Watched, averaging: Averaging) -> PowerSpectralDensity:
     density = power_spectral_density(averaging.powers(source))
     if isinstance(source, Watched):
-        density = _without_constant(density, source, keep=())
+        density = without_constant(density, source, keep=())
         # Segments that were skipped hold variance, too, and that is told.
         whole = [0.0 if density.provenance.skipped else source.variance(one.name) for one in density.channels]
     else:
@@ -359,7 +359,7 @@ def _grid_of(
     return on_one_grid(log, sorted(wanted), span, progress=progress)
 
 
-def _without_constant(spectra: SpectraT, watched: Watched, *, keep: Sequence[str]) -> SpectraT:
+def without_constant(spectra: SpectraT, watched: Watched, *, keep: Sequence[str]) -> SpectraT:
     """Leave out channels that never changed: their spectra are zero, and a table of zeros hides the rest."""
     constant = dict.fromkeys(name for name in watched.constant() if name not in keep)
     if not constant:

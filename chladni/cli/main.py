@@ -24,6 +24,7 @@ from chladni.cli.influence import influence
 from chladni.cli.info import info
 from chladni.cli.levels import levels
 from chladni.cli.modes import modes
+from chladni.cli.octaves import octaves
 from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
 from chladni.cli.view import view
@@ -42,7 +43,23 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (info, levels, psd, frf, modes, view, compare, convert, simulate, influence, gap, excite, bench, demo):
+for command in (
+    info,
+    levels,
+    psd,
+    octaves,
+    frf,
+    modes,
+    view,
+    compare,
+    convert,
+    simulate,
+    influence,
+    gap,
+    excite,
+    bench,
+    demo,
+):
     app.command()(command)
 app.add_typer(blind)
 

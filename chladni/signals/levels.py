@@ -4,8 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
+import numpy as np
+
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel, find_channels
+from chladni.signals.provenance import Provenance
 from chladni.signals.value import Value, require_shape
 
 
@@ -166,3 +169,88 @@ class Severity(Value):
             zones=tuple(self.zones[row] for row in rows) if self.zones else (),
             running=self.running.rows(rows),
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BandLevels(Value):
+    """RMS of channels in frequency bands.
+
+    Attributes
+    ----------
+    low_hz, high_hz
+        ``[band]``, edges of each band.
+    rms
+        ``[channel, band]``, at least 0, in each channel's unit; NaN where a band isn't covered.
+    std
+        ``[channel, band]``, one sigma of `rms`.
+    channels
+        One for each row.
+    provenance
+        How it was made.
+    """
+
+    low_hz: Real
+    high_hz: Real
+    rms: Real
+    std: Real
+    channels: tuple[Channel, ...]
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        expected = (len(self.channels), self.low_hz.size)
+        require_shape("high_hz", self.high_hz, self.low_hz.shape, "one entry a band")
+        require_shape("rms", self.rms, expected, "channels x bands")
+        require_shape("std", self.std, expected, "channels x bands")
+        self._freeze()
+
+
+# Of decibels, by ISO 1683:2015; of other units, 1.
+DECIBEL_REFERENCES = {"Pa": 20e-6, "m/s^2": 1e-6, "m/s": 1e-9, "m": 1e-12, "N": 1e-6}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OctaveLevels(Value):
+    """Levels in octave bands, whole or fractional.
+
+    Attributes
+    ----------
+    fraction
+        Bands in an octave.
+    weighting
+        ``A`` or ``C``, or None.
+    nominal_hz, mid_hz
+        ``[band]``, frequency by which a band is called, and its exact middle.
+    bands
+        Edges, RMS and one sigma of it, ``[channel, band]``.
+    total
+        ``[channel]``, RMS of the whole spectrum, weighted as the bands are.
+    """
+
+    fraction: int
+    weighting: str | None
+    nominal_hz: Real
+    mid_hz: Real
+    bands: BandLevels
+    total: Real
+
+    def __post_init__(self) -> None:
+        for name in ("nominal_hz", "mid_hz"):
+            require_shape(name, getattr(self, name), self.bands.low_hz.shape, "one entry a band")
+        require_shape("total", self.total, (len(self.bands.channels),), "one entry a channel")
+        self._freeze()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """One for each row of the levels."""
+        return self.bands.channels
+
+    def decibels(self) -> Real:
+        """Give ``[channel, band]`` in dB over the references of ISO 1683, such as 20 uPa and 1 um/s^2."""
+        return decibels(self.bands.rms, self.channels)
+
+
+def decibels(rms: Real, channels: Sequence[Channel]) -> Real:
+    """Give ``rms[channel, ...]`` in dB over the reference of each channel's unit (ISO 1683); minus infinity for 0."""
+    reference = np.array([DECIBEL_REFERENCES.get(channel.unit, 1.0) for channel in channels])
+    with np.errstate(divide="ignore"):
+        return np.asarray(20 * np.log10(rms / reference.reshape(-1, *[1] * (rms.ndim - 1))), dtype=np.float64)

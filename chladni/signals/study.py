@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry
-from chladni.signals.levels import Levels, Severity
+from chladni.signals.levels import Levels, OctaveLevels, Severity
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.peak import Peak
@@ -43,6 +43,8 @@ class Study(Drawn):
         Motion between neighbours in each mode, the greatest first.
     levels, severities
         Levels over all and running, and the severity of motions, one entry a sample rate.
+    octaves
+        Levels in octave bands, one entry a sample rate.
     geometry
         Where the points sit; empty when no setup file was given.
     findings
@@ -63,6 +65,7 @@ class Study(Drawn):
     relative_motion: tuple[RelativeMotion, ...] = ()
     levels: tuple[Levels, ...] = ()
     severities: tuple[Severity, ...] = ()
+    octaves: tuple[OctaveLevels, ...] = ()
     geometry: Geometry = field(default_factory=Geometry)
     findings: tuple[str, ...] = ()
     pictures: tuple[tuple[str, bytes], ...] = ()

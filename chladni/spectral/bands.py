@@ -1,50 +1,14 @@
 """RMS levels in frequency bands, from power spectral densities."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from chladni.signals.arrays import Real
-from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
+from chladni.signals.levels import BandLevels
 from chladni.signals.power_spectral_density import PowerSpectralDensity
-from chladni.signals.provenance import Provenance
-from chladni.signals.value import Value, require_shape
 from chladni.spectral.leakage import line_correlation, named_window
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BandLevels(Value):
-    """RMS of channels in frequency bands.
-
-    Attributes
-    ----------
-    low_hz, high_hz
-        ``[band]``, edges of each band.
-    rms
-        ``[channel, band]``, at least 0, in each channel's unit; NaN where a band isn't covered.
-    std
-        ``[channel, band]``, one sigma of `rms`.
-    channels
-        One for each row.
-    provenance
-        How it was made.
-    """
-
-    low_hz: Real
-    high_hz: Real
-    rms: Real
-    std: Real
-    channels: tuple[Channel, ...]
-    provenance: Provenance
-
-    def __post_init__(self) -> None:
-        expected = (len(self.channels), self.low_hz.size)
-        require_shape("high_hz", self.high_hz, self.low_hz.shape, "one entry a band")
-        require_shape("rms", self.rms, expected, "channels x bands")
-        require_shape("std", self.std, expected, "channels x bands")
-        self._freeze()
 
 
 def band_rms(density: PowerSpectralDensity, *, bands_hz: Sequence[tuple[float, float]]) -> BandLevels:
@@ -79,6 +43,8 @@ def band_rms(density: PowerSpectralDensity, *, bands_hz: Sequence[tuple[float, f
 
     Examples
     --------
+    >>> from chladni.signals.channel import Channel
+    >>> from chladni.signals.provenance import Provenance
     >>> flat = PowerSpectralDensity(
     ...     frequency_hz=np.arange(101.0), values=np.full((1, 101), 0.04), std=np.full((1, 101), 0.004),
     ...     channels=(Channel(name="a", unit="m/s^2"),), bandwidth_hz=1.0, provenance=Provenance(),

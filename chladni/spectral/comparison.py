@@ -11,12 +11,13 @@ from chladni.signals.channel import Channel
 from chladni.signals.comparison import DensityComparison, LevelChange, PeakChange, ResponseComparison
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.levels import BandLevels
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.unit_text import in_unit
-from chladni.spectral.bands import BandLevels, total_rms
+from chladni.spectral.bands import total_rms
+from chladni.spectral.octaves import octaves
 from chladni.spectral.peaks import find_peaks, find_response_peaks
-from chladni.spectral.third_octave import third_octave_levels
 
 # Peaks further apart than this share of their frequency, or this many lines, are not the same peak.
 SAME_PEAK_SHARE = 0.05
@@ -214,7 +215,7 @@ def _band_changes(
     before: PowerSpectralDensity, after: PowerSpectralDensity, false_discovery: float
 ) -> tuple[tuple[LevelChange, ...], tuple[str, ...]]:
     try:
-        levels = third_octave_levels(before), third_octave_levels(after)
+        levels = octaves(before).bands, octaves(after).bands
     except EstimateError as error:
         # A coarse spectrum holds no third octave; its lines and its overall level can be compared all the same.
         return (), (f"levels in bands are not compared: {error}",)

@@ -124,6 +124,8 @@ def _channels(study: Study) -> Iterator[Channel]:
         yield from levels.channels
     for severity in study.severities:
         yield from severity.channels
+    for octaves in study.octaves:
+        yield from octaves.channels
     if study.response is not None:
         yield from (*study.response.references, *study.response.responses)
     if study.modes is not None:

@@ -93,6 +93,7 @@ def plain(document: Any) -> Any:
         ("psd", ("--channel", "tip", "--start", 4, "--end", 20, "--resolution", 1)),
         ("levels", ()),
         ("levels", ("--channel", "tip", "--start", 4, "--band", 20, 100)),
+        ("octaves", ("--channel", "tip")),
         ("frf", ()),
         ("frf", ("--reference", "force", "--response", "tip")),
         ("modes", ("--band", 40, 80)),
@@ -223,7 +224,9 @@ def test_a_model_is_driven_by_a_data_file(run: Run, tmp_path: Path) -> None:
 # --- advice ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", ["info", "levels", "psd", "frf", "modes", "view", "compare", "gap", "convert"])
+@pytest.mark.parametrize(
+    "command", ["info", "levels", "psd", "octaves", "frf", "modes", "view", "compare", "gap", "convert"]
+)
 def test_a_rate_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command: str) -> None:
     _bare(measured(), tmp_path / "bare.csv")
     beside: dict[str, tuple[object, ...]] = {
@@ -242,7 +245,7 @@ def test_a_rate_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command
     assert "rate" not in told.err
 
 
-@pytest.mark.parametrize("command", ["info", "levels", "psd", "frf", "modes", "view"])
+@pytest.mark.parametrize("command", ["info", "levels", "psd", "octaves", "frf", "modes", "view"])
 def test_a_time_unit_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command: str) -> None:
     series = measured()
     table = np.column_stack([1000 * series.times_s(), series.values.T])
@@ -280,7 +283,7 @@ def test_what_is_not_read_is_told_by_every_command(run: Run, tmp_path: Path) -> 
     write_uff(measured(), tmp_path / "records.uff")
     path = tmp_path / "a.uff"
     path.write_bytes((tmp_path / "records.uff").read_bytes() + text_set(kind=9).encode())
-    for command in ("info", "levels", "psd", "frf", "modes"):
+    for command in ("info", "levels", "psd", "octaves", "frf", "modes"):
         outcome = run(command, path)
         assert outcome.code == 0, outcome.err
         assert "power spectral density (1): not read" in " ".join(outcome.out.split())
@@ -329,7 +332,7 @@ def test_functions_are_compared(run: Run, functions: Path) -> None:
     assert {one["fate"] for one in outcome.document["response_peaks"]} == {"unchanged"}
 
 
-@pytest.mark.parametrize("command", ["levels", "psd", "gap", "convert", "modes"])
+@pytest.mark.parametrize("command", ["levels", "psd", "octaves", "gap", "convert", "modes"])
 def test_commands_for_samples_say_what_the_file_holds(
     run: Run, functions: Path, tmp_path: Path, command: str
 ) -> None:

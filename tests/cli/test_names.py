@@ -102,6 +102,7 @@ def commands(path: Path, folder: Path) -> Iterator[tuple[object, ...]]:
     yield "info", path
     yield "psd", path
     yield "levels", path, "--csv", folder / "l.csv", "--figures", folder
+    yield "octaves", path, "--figures", folder
     yield "frf", path, "--reference", force, "--response", motion
     yield ("modes", path, "--reference", force, "--channel", motion, "--count", 1, "--csv", folder / "m.csv",
            "--report", folder / "modes.html", "--save", folder / "m.rrd", "--uff", folder / "m.uff")  # fmt: skip

@@ -12,6 +12,7 @@ from chladni.viewers.figures.levels import level_figures
 from chladni.viewers.figures.mac import cross_mac_figure, mac_figures
 from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
+from chladni.viewers.figures.octaves import octave_figures
 from chladni.viewers.figures.relative_motion import relative_motion_figures
 from chladni.viewers.figures.saving import save_album, save_figures
 from chladni.viewers.figures.stabilisation import stabilisation_figures
@@ -29,6 +30,7 @@ __all__ = [
     "mac_figures",
     "mode_shape_figures",
     "nyquist_figures",
+    "octave_figures",
     "relative_motion_figures",
     "response_figures",
     "save_album",

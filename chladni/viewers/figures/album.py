@@ -13,6 +13,7 @@ from chladni.viewers.figures.levels import level_figures
 from chladni.viewers.figures.mac import mac_figures
 from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
+from chladni.viewers.figures.octaves import octave_figures
 from chladni.viewers.figures.relative_motion import relative_motion_figures
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.stabilisation import stabilisation_figures
@@ -41,6 +42,7 @@ class Album:
             {
                 "waveforms": waveform_figures(study),
                 "levels": level_figures(study),
+                "octaves": octave_figures(study),
                 "densities": density_figures(study),
                 "responses": response_figures(study),
                 "nyquist": nyquist_figures(study),
