@@ -38,6 +38,8 @@ _HOME = {
     "levels": "chladni.spectral.levels",
     "severity": "chladni.spectral.severity",
     "octaves": "chladni.spectral.octaves",
+    "envelope": "chladni.spectral.envelope",
+    "kurtogram": "chladni.spectral.kurtogram",
     "mac": "chladni.modal.shapes.mac",
     "relative_motion": "chladni.modal.shapes.relative_motion",
     "validate": "chladni.modal.shapes.validation",
@@ -65,6 +67,9 @@ _HOME = {
     "CrossSpectra": "chladni.signals.cross_spectra",
     "Levels": "chladni.signals.levels",
     "OctaveLevels": "chladni.signals.levels",
+    "Bearing": "chladni.signals.envelope",
+    "EnvelopeSpectrum": "chladni.signals.envelope",
+    "Kurtogram": "chladni.signals.envelope",
     "Severity": "chladni.signals.levels",
     "FrequencyResponse": "chladni.signals.frequency_response",
     "ModalAssurance": "chladni.signals.modal_assurance",
@@ -80,6 +85,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Bearing",
     "Channel",
     "ChladniError",
     "CircleFit",
@@ -87,10 +93,12 @@ __all__ = [
     "CovarianceDrivenSubspace",
     "CrossSpectra",
     "EnhancedFrequencyDomainDecomposition",
+    "EnvelopeSpectrum",
     "EstimateError",
     "FrequencyDomainDecomposition",
     "FrequencyResponse",
     "HalfPower",
+    "Kurtogram",
     "Levels",
     "LogError",
     "ModalAssurance",
@@ -109,12 +117,14 @@ __all__ = [
     "coherence",
     "cross_spectra",
     "diagnose_gap",
+    "envelope",
     "excite",
     "find_peaks",
     "find_response_peaks",
     "frf",
     "identify_modes",
     "influence",
+    "kurtogram",
     "levels",
     "load_model",
     "load_robot",
@@ -177,6 +187,7 @@ if TYPE_CHECKING:
     from chladni.signals.channel import Channel
     from chladni.signals.coherence import Coherence
     from chladni.signals.cross_spectra import CrossSpectra
+    from chladni.signals.envelope import Bearing, EnvelopeSpectrum, Kurtogram
     from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
     from chladni.signals.frequency_response import FrequencyResponse
     from chladni.signals.levels import Levels, OctaveLevels, Severity
@@ -187,6 +198,8 @@ if TYPE_CHECKING:
     from chladni.signals.time_series import TimeSeries
     from chladni.spectral.coherence import coherence
     from chladni.spectral.cross_spectra import cross_spectra
+    from chladni.spectral.envelope import envelope
+    from chladni.spectral.kurtogram import kurtogram
     from chladni.spectral.levels import levels
     from chladni.spectral.octaves import octaves
     from chladni.spectral.peaks import find_peaks, find_response_peaks

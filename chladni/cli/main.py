@@ -17,6 +17,7 @@ from chladni.cli.blind import blind
 from chladni.cli.compare import compare
 from chladni.cli.convert import convert
 from chladni.cli.demo import demo
+from chladni.cli.envelope import envelope
 from chladni.cli.excite import excite
 from chladni.cli.frf import frf
 from chladni.cli.gap import gap
@@ -48,6 +49,7 @@ for command in (
     levels,
     psd,
     octaves,
+    envelope,
     frf,
     modes,
     view,

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from chladni.signals.envelope import EnvelopeSpectrum
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry
 from chladni.signals.levels import Levels, OctaveLevels, Severity
@@ -45,6 +46,8 @@ class Study(Drawn):
         Levels over all and running, and the severity of motions, one entry a sample rate.
     octaves
         Levels in octave bands, one entry a sample rate.
+    envelopes
+        Envelope spectra, one entry a channel.
     geometry
         Where the points sit; empty when no setup file was given.
     findings
@@ -66,6 +69,7 @@ class Study(Drawn):
     levels: tuple[Levels, ...] = ()
     severities: tuple[Severity, ...] = ()
     octaves: tuple[OctaveLevels, ...] = ()
+    envelopes: tuple[EnvelopeSpectrum, ...] = ()
     geometry: Geometry = field(default_factory=Geometry)
     findings: tuple[str, ...] = ()
     pictures: tuple[tuple[str, bytes], ...] = ()

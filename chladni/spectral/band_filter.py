@@ -74,6 +74,8 @@ class BandFilter:
         self._reach = self._samples_of_decay()
         self._response = self._impulse_response()
         self._runs = Runs()
+        # Of each channel, for who has to square what comes out.
+        self.largest = np.zeros(1)
         # Samples of the run that later ones need, and how many of it were before them.
         self._first: TimeSeries | None = None
         self._held, self._taken = HeldSamples(), 0
@@ -100,7 +102,7 @@ class BandFilter:
             When a sample that isn't marked invalid isn't finite, or the block starts before the last one ended.
         """
         for begins, piece in self._runs.pieces(block):
-            require_finite(piece, [(0, piece.samples)])
+            self.largest = np.maximum(self.largest, require_finite(piece, [(0, piece.samples)]))
             if begins:
                 yield from self._filtered()
                 self._first, self._taken, self._held = piece, 0, HeldSamples()

@@ -126,6 +126,7 @@ def _channels(study: Study) -> Iterator[Channel]:
         yield from severity.channels
     for octaves in study.octaves:
         yield from octaves.channels
+    yield from (envelope.channel for envelope in study.envelopes)
     if study.response is not None:
         yield from (*study.response.references, *study.response.responses)
     if study.modes is not None:

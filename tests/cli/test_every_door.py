@@ -94,6 +94,7 @@ def plain(document: Any) -> Any:
         ("levels", ()),
         ("levels", ("--channel", "tip", "--start", 4, "--band", 20, 100)),
         ("octaves", ("--channel", "tip")),
+        ("envelope", ("--channel", "tip", "--band", 40, 80)),
         ("frf", ()),
         ("frf", ("--reference", "force", "--response", "tip")),
         ("modes", ("--band", 40, 80)),
@@ -225,7 +226,7 @@ def test_a_model_is_driven_by_a_data_file(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["info", "levels", "psd", "octaves", "frf", "modes", "view", "compare", "gap", "convert"]
+    "command", ["info", "levels", "psd", "octaves", "envelope", "frf", "modes", "view", "compare", "gap", "convert"]
 )
 def test_a_rate_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command: str) -> None:
     _bare(measured(), tmp_path / "bare.csv")
@@ -245,7 +246,7 @@ def test_a_rate_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command
     assert "rate" not in told.err
 
 
-@pytest.mark.parametrize("command", ["info", "levels", "psd", "octaves", "frf", "modes", "view"])
+@pytest.mark.parametrize("command", ["info", "levels", "psd", "octaves", "envelope", "frf", "modes", "view"])
 def test_a_time_unit_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command: str) -> None:
     series = measured()
     table = np.column_stack([1000 * series.times_s(), series.values.T])
@@ -283,7 +284,7 @@ def test_what_is_not_read_is_told_by_every_command(run: Run, tmp_path: Path) -> 
     write_uff(measured(), tmp_path / "records.uff")
     path = tmp_path / "a.uff"
     path.write_bytes((tmp_path / "records.uff").read_bytes() + text_set(kind=9).encode())
-    for command in ("info", "levels", "psd", "octaves", "frf", "modes"):
+    for command in ("info", "levels", "psd", "octaves", "envelope", "frf", "modes"):
         outcome = run(command, path)
         assert outcome.code == 0, outcome.err
         assert "power spectral density (1): not read" in " ".join(outcome.out.split())
@@ -332,7 +333,7 @@ def test_functions_are_compared(run: Run, functions: Path) -> None:
     assert {one["fate"] for one in outcome.document["response_peaks"]} == {"unchanged"}
 
 
-@pytest.mark.parametrize("command", ["levels", "psd", "octaves", "gap", "convert", "modes"])
+@pytest.mark.parametrize("command", ["levels", "psd", "octaves", "envelope", "gap", "convert", "modes"])
 def test_commands_for_samples_say_what_the_file_holds(
     run: Run, functions: Path, tmp_path: Path, command: str
 ) -> None:

@@ -7,6 +7,7 @@ from chladni.viewers.figures.album import Album
 from chladni.viewers.figures.comparison import comparison_figures
 from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
+from chladni.viewers.figures.envelope import envelope_figures
 from chladni.viewers.figures.frequency_response import response_figures
 from chladni.viewers.figures.levels import level_figures
 from chladni.viewers.figures.mac import cross_mac_figure, mac_figures
@@ -26,6 +27,7 @@ __all__ = [
     "complexity_figures",
     "cross_mac_figure",
     "density_figures",
+    "envelope_figures",
     "level_figures",
     "mac_figures",
     "mode_shape_figures",

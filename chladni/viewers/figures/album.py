@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from chladni.signals.study import Study
 from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
+from chladni.viewers.figures.envelope import envelope_figures
 from chladni.viewers.figures.frequency_response import response_figures
 from chladni.viewers.figures.levels import level_figures
 from chladni.viewers.figures.mac import mac_figures
@@ -43,6 +44,7 @@ class Album:
                 "waveforms": waveform_figures(study),
                 "levels": level_figures(study),
                 "octaves": octave_figures(study),
+                "envelopes": envelope_figures(study),
                 "densities": density_figures(study),
                 "responses": response_figures(study),
                 "nyquist": nyquist_figures(study),

@@ -40,6 +40,7 @@ def _sections(album: Album) -> dict[str, list[tuple[str, str]]]:
         "Frequency responses": [(name, masked) for pair in pairs for name in pair],
         "Levels": captioned("levels", "Solid: RMS of each window. Pale: its peak about the mean."),
         "Octave bands": captioned("octaves", "Summed from spectral lines."),
+        "Envelope spectra": captioned("envelopes", "Dashed: frequencies of the bearing, and their multiples."),
         "Power spectral densities": captioned("densities", f"One-sided. {_SIGMA}"),
         "Waterfalls": captioned("waterfalls", "Grey: samples are missing."),
         "Waveforms": captioned("waveforms", "Long records are drawn by the extremes of each stretch."),

@@ -1,0 +1,149 @@
+"""Envelope spectra of a log, and their document."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from chladni.apps.documents import Document, finite, plain
+from chladni.apps.sources import Progress, Span, Watched, no_progress, watched_grids
+from chladni.io.log import Log
+from chladni.io.log_info import some_of
+from chladni.signals.envelope import Bearing, EnvelopeSpectrum, Kurtogram
+from chladni.signals.errors import EstimateError
+from chladni.signals.peak import Peak
+from chladni.spectral.blocks import leading_part
+from chladni.spectral.envelope import SEGMENTS, BandChoice, EnvelopeAccumulator, chosen_bands, fault_frequencies_hz
+from chladni.spectral.peaks import find_peaks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LogEnvelopes:
+    """Envelope spectra of a log's channels with their named peaks, and what was left out, in sentences."""
+
+    spectra: tuple[EnvelopeSpectrum, ...]
+    peaks: tuple[tuple[Peak, ...], ...]
+    notes: tuple[str, ...]
+
+
+def measure_envelopes(
+    log: Log,
+    *,
+    channels: Sequence[str] | None = None,
+    band_hz: tuple[float, float] | None = None,
+    resolution_hz: float | None = None,
+    bearing: Bearing | None = None,
+    shaft_hz: float | None = None,
+    span: Span | None = None,
+    progress: Progress = no_progress,
+) -> LogEnvelopes:
+    """Compute the envelope spectra of a log's channels, see `chladni.spectral.envelope.envelope`.
+
+    A log is read twice when its bands are to be chosen: once for the kurtogram, once for the envelopes.
+
+    Raises
+    ------
+    LogError
+        When there is no such channel.
+    EstimateError
+        When no channel has an envelope spectrum.
+    SetupError
+        When only one of bearing and shaft is known.
+    """
+    span, faults_hz = span or Span(), fault_frequencies_hz(bearing, shaft_hz)
+    spectra: list[EnvelopeSpectrum] = []
+    notes: list[str] = []
+    choices = {} if band_hz else _choices(log, channels, span, faults_hz, notes)
+    for grid in watched_grids(log, channels, span, progress=progress):
+        bands = dict.fromkeys(grid.names, BandChoice(band_hz=band_hz)) if band_hz else choices
+        try:
+            spectra += _spectra(grid, bands, resolution_hz, faults_hz)
+        except EstimateError as error:
+            notes.append(f"{some_of(grid.names)}: {error}")
+    if not spectra:
+        raise EstimateError(f"{log.path.name}: no envelope spectrum could be made: {'; '.join(notes)}")
+    notes += [note for one in spectra for note in one.notes]
+    peaks = tuple(_named(one) for one in spectra)
+    return LogEnvelopes(spectra=tuple(spectra), peaks=peaks, notes=tuple(dict.fromkeys(notes)))
+
+
+def _named(found: EnvelopeSpectrum) -> tuple[Peak, ...]:
+    """Name the peaks, the highest line first."""
+
+    def depth(peak: Peak) -> float:
+        return -float(found.amplitude[np.argmin(np.abs(found.frequency_hz - peak.frequency_hz))])
+
+    return tuple(sorted(find_peaks(found.density), key=depth))
+
+
+def _choices(
+    log: Log, channels: Sequence[str] | None, span: Span, faults_hz: Mapping[str, float], notes: list[str]
+) -> dict[str, BandChoice]:
+    """Bands by the name of their channel; those that never change have none, and a note says so."""
+    found: dict[str, BandChoice] = {}
+    for grid in watched_grids(log, channels, span):
+        try:
+            found |= dict(zip(grid.names, chosen_bands(grid, faults_hz), strict=True))
+        except EstimateError as error:
+            notes.append(f"{some_of(grid.names)}: {error}")
+        constant = grid.constant()
+        if constant:
+            notes.append(f"channels that never change are left out: {some_of(constant)}")
+            found = {name: choice for name, choice in found.items() if name not in constant}
+    return found
+
+
+def _spectra(
+    grid: Watched, bands: Mapping[str, BandChoice], resolution_hz: float | None, faults_hz: Mapping[str, float]
+) -> list[EnvelopeSpectrum]:
+    """Envelope spectra of one sampling grid, of the channels that have a band."""
+    lead, blocks = leading_part(grid, 1)
+    rate_hz = lead[0].sample_rate_hz
+    resolution_hz, samples = resolution_hz or SEGMENTS / grid.duration_s, round(grid.duration_s * rate_hz)
+    accumulators = [
+        EnvelopeAccumulator(channel, rate_hz, bands[channel.name], resolution_hz=resolution_hz, samples=samples)
+        for channel in lead[0].channels
+        if channel.name in bands
+    ]
+    for block in blocks if accumulators else ():
+        for one in accumulators:
+            one.update(block.select([one.channel.name]))
+    constant = grid.constant()
+    return [one.result(faults_hz) for one in accumulators if one.channel.name not in constant]
+
+
+def envelope_document(found: LogEnvelopes) -> Document:
+    """Document of ``chladni envelope``."""
+    return {
+        "format": "chladni.envelope/1",
+        "channels": [_channel(one, peaks) for one, peaks in zip(found.spectra, found.peaks, strict=True)],
+        "notes": list(found.notes),
+    }
+
+
+def _channel(found: EnvelopeSpectrum, peaks: Sequence[Peak]) -> Document:
+    return {
+        "name": found.channel.name,
+        "unit": found.channel.unit,
+        "low_hz": found.band_hz[0],
+        "high_hz": found.band_hz[1],
+        "spectral_kurtosis": finite(found.band_kurtosis),
+        "envelope_unit": found.density.channels[0].unit,
+        "mean": found.mean,
+        "frequency_hz": plain(found.frequency_hz),
+        "amplitude": plain(found.amplitude),
+        "peaks": [
+            {"frequency_hz": peak.frequency_hz, "frequency_std_hz": finite(peak.frequency_std_hz)} for peak in peaks
+        ],
+        "faults": [asdict(fault) for fault in found.faults],
+        "kurtogram": None if found.kurtogram is None else _kurtogram(found.kurtogram),
+    }
+
+
+def _kurtogram(found: Kurtogram) -> Document:
+    return {
+        "low_hz": plain(found.low_hz),
+        "high_hz": plain(found.high_hz),
+        "spectral_kurtosis": plain(found.kurtosis[0]),
+        "spectral_kurtosis_std": plain(found.std[0]),
+    }

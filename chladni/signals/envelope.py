@@ -1,0 +1,184 @@
+"""Envelope spectra: what modulates a band, the band's kurtogram, and a bearing's frequencies."""
+
+from dataclasses import dataclass, replace
+from math import cos, radians
+from typing import Self
+
+import numpy as np
+
+from chladni.signals.arrays import Real
+from chladni.signals.channel import Channel
+from chladni.signals.errors import EstimateError
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.value import Value, require_shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bearing:
+    """Geometry of a rolling element bearing.
+
+    Attributes
+    ----------
+    elements
+        Balls or rollers in one row.
+    element_diameter, pitch_diameter
+        Of a ball or roller, and of the circle of their centres, in one unit; only their ratio counts.
+    contact_angle_deg
+        Angle of contact, from the radial plane.
+
+    Raises
+    ------
+    EstimateError
+        When it is no bearing.
+    """
+
+    elements: int
+    element_diameter: float
+    pitch_diameter: float
+    contact_angle_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.elements < 2 or not 0 < self.element_diameter < self.pitch_diameter < float("inf"):
+            raise EstimateError(
+                f"a bearing of {self.elements} elements, {self.element_diameter:g} on a circle of "
+                f"{self.pitch_diameter:g}: there must be 2 or more, smaller than the circle of their centres"
+            )
+        if not 0 <= self.contact_angle_deg < 90:
+            raise EstimateError(f"a contact angle of {self.contact_angle_deg:g} degrees must be from 0 to below 90")
+
+    def frequencies_hz(self, shaft_hz: float) -> dict[str, float]:
+        """Give the frequencies at which faults are struck while the inner ring turns and nothing slips.
+
+        Notes
+        -----
+        With n elements of diameter d on a circle D, contact angle phi and f_r of the shaft (Randall & Antoni 2011,
+        Mech. Syst. Signal Process. 25, eq. 1 to 4): BPFO = n f_r/2 (1 - d/D cos phi), BPFI = n f_r/2 (1 + d/D cos
+        phi), FTF = f_r/2 (1 - d/D cos phi), BSF = D f_r/(2 d) (1 - (d/D cos phi)^2). A fault of an element strikes
+        both rings, at 2 BSF. Slip makes all but the shaft's frequency 1 to 2 % other than this.
+
+        Examples
+        --------
+        >>> found = Bearing(elements=9, element_diameter=7.94, pitch_diameter=39.04).frequencies_hz(1.0)
+        >>> {name: round(value, 3) for name, value in found.items()}  # SKF 6205, as published by its users
+        {'BPFO': 3.585, 'BPFI': 5.415, 'BSF': 2.357, 'FTF': 0.398}
+        """
+        if not 0 < shaft_hz < float("inf"):
+            raise EstimateError(f"a shaft at {shaft_hz:g} Hz must turn; give its revolutions a second")
+        ratio = self.element_diameter / self.pitch_diameter * cos(radians(self.contact_angle_deg))
+        return {
+            "BPFO": self.elements * shaft_hz / 2 * (1 - ratio),
+            "BPFI": self.elements * shaft_hz / 2 * (1 + ratio),
+            "BSF": self.pitch_diameter / (2 * self.element_diameter) * shaft_hz * (1 - ratio**2),
+            "FTF": shaft_hz / 2 * (1 - ratio),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Kurtogram(Value):
+    """Spectral kurtosis over bands of the spectrum halved and cut in thirds again and again.
+
+    Attributes
+    ----------
+    low_hz, high_hz
+        ``[band]``, edges; from the whole spectrum to the narrowest bands.
+    kurtosis
+        ``[channel, band]``, mean(abs(c)^4)/mean(abs(c)^2)^2 - 2 of the complex envelope c: 0 for Gaussian noise, -1
+        for a tone, high for blows.
+    std
+        ``[channel, band]``, one sigma of it for Gaussian noise.
+    channels
+        One for each row.
+    """
+
+    low_hz: Real
+    high_hz: Real
+    kurtosis: Real
+    std: Real
+    channels: tuple[Channel, ...]
+
+    def __post_init__(self) -> None:
+        require_shape("high_hz", self.high_hz, self.low_hz.shape, "one entry a band")
+        for name in ("kurtosis", "std"):
+            require_shape(name, getattr(self, name), (len(self.channels), self.low_hz.size), "channels x bands")
+        self._freeze()
+
+    def select(self, row: int) -> Self:
+        """Give the kurtogram of one channel."""
+        rows = slice(row, row + 1)
+        return replace(self, kurtosis=self.kurtosis[rows], std=self.std[rows], channels=self.channels[rows])
+
+    def best(self, row: int = 0, *, least_width_hz: float = 0.0) -> int:
+        """Give the band of greatest kurtosis less three sigma, at least so wide, and without 0 Hz."""
+        wide = (self.high_hz - self.low_hz >= least_width_hz * (1 - 1e-9)) & (self.low_hz > 0)
+        if not wide.any():
+            raise EstimateError(
+                f"no band is {least_width_hz:g} Hz wide, which the bearing's frequencies need; sample faster"
+            )
+        return int(np.argmax(np.where(wide, self.kurtosis[row] - 3 * self.std[row], -np.inf)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultLine:
+    """A bearing's frequency in an envelope spectrum.
+
+    Attributes
+    ----------
+    name
+        ``BPFO``, ``BPFI``, ``BSF`` or ``FTF``, a multiple in front: ``2 BPFO``.
+    expected_hz, found_hz
+        By geometry, and of the highest line within the bearing's slip.
+    amplitude
+        Of that line, in the square of the channel's unit.
+    over_background
+        Over the median of the lines around.
+    """
+
+    name: str
+    expected_hz: float
+    found_hz: float
+    amplitude: float
+    over_background: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class EnvelopeSpectrum(Value):
+    """Spectrum of one channel's squared envelope in a band.
+
+    Attributes
+    ----------
+    channel
+        The channel that was measured.
+    band_hz
+        The band whose envelope it is.
+    band_kurtosis
+        Spectral kurtosis there; NaN where the band was named.
+    density
+        Density of the squared envelope, of one channel in the square of the unit, up to the width of the band.
+    mean
+        Mean of the squared envelope: twice the power in the band.
+    kurtogram
+        By which the band was chosen; None where it was named.
+    faults
+        The bearing's frequencies and their multiples; empty without a bearing.
+    notes
+        What to distrust, in sentences.
+    """
+
+    channel: Channel
+    band_hz: tuple[float, float]
+    band_kurtosis: float
+    density: PowerSpectralDensity
+    mean: float
+    kurtogram: Kurtogram | None = None
+    faults: tuple[FaultLine, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def frequency_hz(self) -> Real:
+        """``[frequency]``, of the modulation."""
+        return self.density.frequency_hz
+
+    @property
+    def amplitude(self) -> Real:
+        """``[frequency]``, amplitude that a sine on each line has in the squared envelope, sqrt(2 G B)."""
+        return np.asarray(np.sqrt(2 * self.density.values[0] * self.density.bandwidth_hz), dtype=np.float64)

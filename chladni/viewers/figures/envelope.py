@@ -1,0 +1,101 @@
+"""Envelope spectra under the kurtogram that chose their band, with a bearing's frequencies."""
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+from chladni.signals.envelope import EnvelopeSpectrum, Kurtogram
+from chladni.signals.study import Study
+from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
+from chladni.viewers.labels import printed_unit
+from chladni.viewers.style import ON_LIGHT, Colour, Style
+
+KURTOGRAM_IN, SPECTRUM_IN = 1.7, 2.3
+# Beside the mean, which isn't drawn, and above the highest frequency that is looked for.
+LINES_LEFT_OUT, ROOM = 3, 1.3
+# Without a bearing: lines that a figure of this width can still tell apart.
+MOST_LINES = 1000
+# Of the band that was chosen: no colour of the kurtogram's scale is near it.
+FRAME = ON_LIGHT[1]
+
+
+def envelope_figures(study: Study) -> dict[str, Figure]:
+    """Draw each channel's envelope spectrum, by name; above it the kurtogram with the band framed, where it chose."""
+    style = Style.of(study)
+    with look():
+        return {f"envelope {place}": _figure(one, style) for place, one in enumerate(study.envelopes, start=1)}
+
+
+def _figure(found: EnvelopeSpectrum, style: Style) -> Figure:
+    heights = [SPECTRUM_IN] if found.kurtogram is None else [KURTOGRAM_IN, SPECTRUM_IN]
+    figure, stack = sheet(heights)
+    if found.kurtogram is not None:
+        _kurtogram(figure, stack[0], found.kurtogram, found.band_hz)
+    stack[0].set_title(plain(style.labels[found.channel.name]), loc="left", pad=3)
+    _spectrum(stack[-1], found, style)
+    return figure
+
+
+def _kurtogram(figure: Figure, axes: Axes, gram: Kurtogram, band_hz: tuple[float, float]) -> None:
+    # A row for each width, the widest above, as everywhere in the field.
+    widths = np.round(np.log2((gram.high_hz[0] - gram.low_hz[0]) / (gram.high_hz - gram.low_hz)), 6)
+    rows = np.unique(widths, return_inverse=True)[1]
+    boxes = [_box(low, high, row) for low, high, row in zip(gram.low_hz, gram.high_hz, rows, strict=True)]
+    values = gram.kurtosis[0]
+    bands = PolyCollection(boxes, array=values, cmap=mpl.colormaps["viridis"], linewidths=0)
+    bands.set_clim(0.0, max(float(values.max()), 0.1))
+    axes.add_collection(bands)
+    chosen = int(np.argmin(np.abs(gram.low_hz - band_hz[0]) + np.abs(gram.high_hz - band_hz[1])))
+    frame = PolyCollection([boxes[chosen]], facecolors="none", edgecolors=[paint(FRAME)], linewidths=1.4)
+    axes.add_collection(frame)
+    axes.set_xlim(0.0, gram.high_hz[0])
+    axes.set_ylim(rows.max() + 0.5, -0.5)
+    ticks = list(range(0, rows.max() + 1, 3))
+    axes.set_yticks(ticks, [_hertz(float((gram.high_hz - gram.low_hz)[rows == row][0])) for row in ticks])
+    axes.set_ylabel("Width [Hz]")
+    axes.set_xlabel("Frequency [Hz]")
+    axes.grid(visible=False)
+    bar = figure.colorbar(bands, ax=axes, pad=0.02, aspect=12)
+    bar.set_label("Spectral kurtosis")
+    bar.outline.set_linewidth(0.0)
+
+
+def _box(low_hz: float, high_hz: float, row: int) -> list[tuple[float, float]]:
+    return [(low_hz, row - 0.5), (high_hz, row - 0.5), (high_hz, row + 0.5), (low_hz, row + 0.5)]
+
+
+def _spectrum(axes: Axes, found: EnvelopeSpectrum, style: Style) -> None:
+    frequency_hz, amplitude = found.frequency_hz, found.amplitude
+    highest_hz = ROOM * max((fault.expected_hz for fault in found.faults), default=0.0)
+    end_hz = min(highest_hz or frequency_hz[min(MOST_LINES, frequency_hz.size - 1)], float(frequency_hz[-1]))
+    shown = (np.arange(frequency_hz.size) >= LINES_LEFT_OUT) & (frequency_hz <= end_hz)
+    top = float(amplitude[shown].max(initial=0.0)) or 1.0
+    _marks(axes, found)
+    axes.plot(frequency_hz[shown], amplitude[shown], color=paint(style.on_light(found.channel)))
+    axes.set_xlim(0.0, end_hz)
+    axes.set_ylim(0.0, 1.05 * top)
+    axes.set_xlabel(f"Frequency [Hz], envelope of {_hertz(found.band_hz[0])} to {_hertz(found.band_hz[1])} Hz")
+    axes.set_ylabel(f"Squared envelope [{printed_unit(found.density.channels[0].unit)}]")
+
+
+def _marks(axes: Axes, found: EnvelopeSpectrum) -> None:
+    """Draw a bearing's frequencies and their multiples, a colour and an entry of the legend for each."""
+    colours = iter(colour for colour in ON_LIGHT[1:] if colour != FRAME)
+    drawn: dict[str, Colour] = {}
+    for fault in found.faults:
+        *multiple, name = fault.name.split()
+        label = None
+        if name not in drawn:
+            drawn[name] = next(colours)
+            label = f"{name} {fault.expected_hz / int(*multiple or (1,)):.4g} Hz"
+        axes.axvline(
+            fault.expected_hz, color=paint(drawn[name]), linewidth=0.7, linestyle="--", zorder=1, label=label
+        )
+    if drawn:
+        legend(axes)
+
+
+def _hertz(frequency_hz: float) -> str:
+    return f"{frequency_hz:.0f}" if frequency_hz >= 1000 else f"{frequency_hz:.4g}"
