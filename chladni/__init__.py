@@ -38,6 +38,7 @@ _HOME = {
     "levels": "chladni.spectral.levels",
     "severity": "chladni.spectral.severity",
     "octaves": "chladni.spectral.octaves",
+    "cepstrum": "chladni.spectral.cepstrum",
     "envelope": "chladni.spectral.envelope",
     "kurtogram": "chladni.spectral.kurtogram",
     "mac": "chladni.modal.shapes.mac",
@@ -68,6 +69,7 @@ _HOME = {
     "Levels": "chladni.signals.levels",
     "OctaveLevels": "chladni.signals.levels",
     "Bearing": "chladni.signals.envelope",
+    "Cepstrum": "chladni.signals.cepstrum",
     "EnvelopeSpectrum": "chladni.signals.envelope",
     "Kurtogram": "chladni.signals.envelope",
     "Severity": "chladni.signals.levels",
@@ -86,6 +88,7 @@ _HOME = {
 
 __all__ = [
     "Bearing",
+    "Cepstrum",
     "Channel",
     "ChladniError",
     "CircleFit",
@@ -114,6 +117,7 @@ __all__ = [
     "Wish",
     "analyse",
     "attached",
+    "cepstrum",
     "coherence",
     "cross_spectra",
     "diagnose_gap",
@@ -184,6 +188,7 @@ if TYPE_CHECKING:
     from chladni.models.integrator.simulate import simulate
     from chladni.robots.excite import excite
     from chladni.robots.loading import load_robot
+    from chladni.signals.cepstrum import Cepstrum
     from chladni.signals.channel import Channel
     from chladni.signals.coherence import Coherence
     from chladni.signals.cross_spectra import CrossSpectra
@@ -196,6 +201,7 @@ if TYPE_CHECKING:
     from chladni.signals.power_spectral_density import PowerSpectralDensity
     from chladni.signals.study import Study
     from chladni.signals.time_series import TimeSeries
+    from chladni.spectral.cepstrum import cepstrum
     from chladni.spectral.coherence import coherence
     from chladni.spectral.cross_spectra import cross_spectra
     from chladni.spectral.envelope import envelope

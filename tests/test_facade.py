@@ -7,17 +7,16 @@ import pytest
 import chladni
 
 SURFACE = {
-    "Bearing", "Channel", "ChladniError", "CircleFit", "Coherence", "CovarianceDrivenSubspace", "CrossSpectra",
-    "EnhancedFrequencyDomainDecomposition", "EnvelopeSpectrum", "EstimateError", "FrequencyDomainDecomposition",
-    "FrequencyResponse", "HalfPower", "Kurtogram", "Levels", "LogError", "ModeSet", "ModelError", "OctaveLevels",
-    "PolyReferenceLeastSquares",
+    "Bearing", "Cepstrum", "Channel", "ChladniError", "CircleFit", "Coherence", "CovarianceDrivenSubspace",
+    "CrossSpectra", "EnhancedFrequencyDomainDecomposition", "EnvelopeSpectrum", "EstimateError",
+    "FrequencyDomainDecomposition", "FrequencyResponse", "HalfPower", "Kurtogram", "Levels", "LogError",
+    "ModalAssurance", "ModeSet", "ModelError", "OctaveLevels", "PolyReferenceLeastSquares",
     "PowerSpectralDensity", "SetupError", "Severity", "Study", "TimeSeries", "Wish", "analyse", "attached",
-    "coherence", "cross_spectra", "diagnose_gap", "envelope", "excite",
-    "find_peaks", "find_response_peaks", "frf", "identify_modes", "influence", "kurtogram", "levels",
-    "load_model", "load_robot",
-    "load_setup", "locate_from_levels", "mac",
-    "octaves", "open", "open_log", "optimise", "psd",
-    "relative_motion", "severity", "show", "simulate", "validate", "waterfall", "write_mcap", "write_model",
+    "cepstrum", "coherence", "cross_spectra", "diagnose_gap", "envelope", "excite", "find_peaks",
+    "find_response_peaks", "frf", "identify_modes", "influence", "kurtogram", "levels", "load_model",
+    "load_robot", "load_setup", "locate_from_levels", "mac", "octaves", "open", "open_log", "optimise", "plot",
+    "psd", "relative_motion", "severity", "show", "simulate", "validate", "waterfall", "write_mcap",
+    "write_model",
 }  # fmt: skip
 HEAVY = {"numpy", "scipy", "rerun", "matplotlib", "pint", "pydantic", "mcap", "zstandard", "numba", "panel", "bokeh"}
 

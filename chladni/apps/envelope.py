@@ -6,14 +6,13 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from chladni.apps.documents import Document, finite, plain
-from chladni.apps.sources import Progress, Span, Watched, no_progress, watched_grids
+from chladni.apps.sources import Progress, Span, no_progress, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.envelope import Bearing, EnvelopeSpectrum, Kurtogram
 from chladni.signals.errors import EstimateError
 from chladni.signals.peak import Peak
-from chladni.spectral.blocks import leading_part
-from chladni.spectral.envelope import SEGMENTS, BandChoice, EnvelopeAccumulator, chosen_bands, fault_frequencies_hz
+from chladni.spectral.envelope import BandChoice, chosen_bands, envelope_spectra, fault_frequencies_hz
 from chladni.spectral.peaks import find_peaks
 
 
@@ -57,7 +56,11 @@ def measure_envelopes(
     for grid in watched_grids(log, channels, span, progress=progress):
         bands = dict.fromkeys(grid.names, BandChoice(band_hz=band_hz)) if band_hz else choices
         try:
-            spectra += _spectra(grid, bands, resolution_hz, faults_hz)
+            found = envelope_spectra(
+                grid, bands, length_s=grid.duration_s, resolution_hz=resolution_hz, faults_hz=faults_hz
+            )
+            constant = grid.constant()
+            spectra += [one for one in found if one.channel.name not in constant]
         except EstimateError as error:
             notes.append(f"{some_of(grid.names)}: {error}")
     if not spectra:
@@ -83,7 +86,7 @@ def _choices(
     found: dict[str, BandChoice] = {}
     for grid in watched_grids(log, channels, span):
         try:
-            found |= dict(zip(grid.names, chosen_bands(grid, faults_hz), strict=True))
+            found |= chosen_bands(grid, faults_hz)
         except EstimateError as error:
             notes.append(f"{some_of(grid.names)}: {error}")
         constant = grid.constant()
@@ -91,25 +94,6 @@ def _choices(
             notes.append(f"channels that never change are left out: {some_of(constant)}")
             found = {name: choice for name, choice in found.items() if name not in constant}
     return found
-
-
-def _spectra(
-    grid: Watched, bands: Mapping[str, BandChoice], resolution_hz: float | None, faults_hz: Mapping[str, float]
-) -> list[EnvelopeSpectrum]:
-    """Envelope spectra of one sampling grid, of the channels that have a band."""
-    lead, blocks = leading_part(grid, 1)
-    rate_hz = lead[0].sample_rate_hz
-    resolution_hz, samples = resolution_hz or SEGMENTS / grid.duration_s, round(grid.duration_s * rate_hz)
-    accumulators = [
-        EnvelopeAccumulator(channel, rate_hz, bands[channel.name], resolution_hz=resolution_hz, samples=samples)
-        for channel in lead[0].channels
-        if channel.name in bands
-    ]
-    for block in blocks if accumulators else ():
-        for one in accumulators:
-            one.update(block.select([one.channel.name]))
-    constant = grid.constant()
-    return [one.result(faults_hz) for one in accumulators if one.channel.name not in constant]
 
 
 def envelope_document(found: LogEnvelopes) -> Document:

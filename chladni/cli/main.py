@@ -14,6 +14,7 @@ from chladni import __version__
 from chladni.apps.stopping import LISTENER, Stopped
 from chladni.cli.bench import bench
 from chladni.cli.blind import blind
+from chladni.cli.cepstrum import cepstrum
 from chladni.cli.compare import compare
 from chladni.cli.convert import convert
 from chladni.cli.demo import demo
@@ -50,6 +51,7 @@ for command in (
     psd,
     octaves,
     envelope,
+    cepstrum,
     frf,
     modes,
     view,

@@ -139,6 +139,22 @@ def blocks_of(
     return found.blocks(names, seconds=seconds, start_s=start_s, end_s=end_s)
 
 
+def extent_of(
+    source: Log | TimeSeries,
+    *,
+    channels: Names | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> tuple[float, float]:
+    """Give the sample rate in Hz and the duration in seconds of what `blocks_of` gives, before a sample is read."""
+    if isinstance(source, TimeSeries):
+        series = series_of(source, channels=channels, start_s=start_s, end_s=end_s)
+        return series.sample_rate_hz, series.duration_s
+    names = None if channels is None else as_names(channels)
+    grid = source.grids(names, start_s=start_s, end_s=end_s)[0]
+    return grid.sample_rate_hz, grid.duration_s
+
+
 def block_seconds(channels: int, sample_rate_hz: float) -> float:
     """How long a block is that memory holds easily, in seconds."""
     return max(1.0, VALUES_IN_A_BLOCK / (channels * sample_rate_hz))

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from math import cos, radians
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -164,6 +164,9 @@ class EnvelopeSpectrum(Value):
         What to distrust, in sentences.
     """
 
+    AXES: ClassVar = {"amplitude": ("frequency_hz",)}
+    ROWS: ClassVar = "frequency_hz"
+
     channel: Channel
     band_hz: tuple[float, float]
     band_kurtosis: float
@@ -172,6 +175,10 @@ class EnvelopeSpectrum(Value):
     kurtogram: Kurtogram | None = None
     faults: tuple[FaultLine, ...] = ()
     notes: tuple[str, ...] = ()
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of the squared envelope."""
+        return self.density.channels[0].unit
 
     @property
     def frequency_hz(self) -> Real:

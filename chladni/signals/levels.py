@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel, find_channels
 from chladni.signals.provenance import Provenance
-from chladni.signals.value import Value, require_shape
+from chladni.signals.value import Coordinate, Value, require_shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -24,15 +24,22 @@ class RunningLevels(Value):
         ``[window]``, centre of each, seconds since `start_time_ns`.
     rms, peak, kurtosis
         ``[channel, band, window]``, as in `Levels` but about the window's own mean; NaN in windows without a sample.
+    channels, bands_hz
+        As in `Levels`.
     start_time_ns
         Time of the first sample, nanoseconds since the Unix epoch.
     """
+
+    AXES: ClassVar = dict.fromkeys(("rms", "peak", "kurtosis"), ("channels", "bands_hz", "time_s"))
+    ROWS: ClassVar = "time_s"
 
     window_s: float
     time_s: Real
     rms: Real
     peak: Real
     kurtosis: Real
+    channels: tuple[Channel, ...]
+    bands_hz: tuple[tuple[float, float], ...]
     start_time_ns: int
 
     def __post_init__(self) -> None:
@@ -44,7 +51,25 @@ class RunningLevels(Value):
     def rows(self, rows: Sequence[int]) -> Self:
         """Give the levels of some channels, in the order asked for."""
         chosen = list(rows)
-        return replace(self, rms=self.rms[chosen], peak=self.peak[chosen], kurtosis=self.kurtosis[chosen])
+        return replace(
+            self,
+            rms=self.rms[chosen],
+            peak=self.peak[chosen],
+            kurtosis=self.kurtosis[chosen],
+            channels=tuple(self.channels[row] for row in chosen),
+        )
+
+    def coordinate(self, axis: str) -> Coordinate:
+        """Give what stands along an axis, bands as ``10 to 1000 Hz``."""
+        return _band_names(self.bands_hz) if axis == "bands_hz" else super(RunningLevels, self).coordinate(axis)
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:
+        """Give the unit of a channel's levels; none of kurtosis."""
+        return "" if field == "kurtosis" else self.channels[place[0]].unit
+
+
+def _band_names(bands_hz: Sequence[tuple[float, float]]) -> list[str]:
+    return [f"{low_hz:.6g} to {high_hz:.6g} Hz" for low_hz, high_hz in bands_hz]
 
 
 _BY_CHANNEL = (
@@ -90,6 +115,9 @@ class Levels(Value):
         What was left out, in sentences.
     """
 
+    AXES: ClassVar = dict.fromkeys(("rms", *(one for one in _BY_CHANNEL if one != "rms")), ("channels", "bands_hz"))
+    ROWS: ClassVar = "channels"
+
     channels: tuple[Channel, ...]
     bands_hz: tuple[tuple[float, float], ...]
     samples: Whole
@@ -118,6 +146,10 @@ class Levels(Value):
         channels = tuple(self.channels[row] for row in rows)
         return replace(self, channels=channels, running=self.running.rows(rows), **chosen)
 
+    def coordinate(self, axis: str) -> Coordinate:
+        """Give what stands along an axis, bands as ``10 to 1000 Hz``."""
+        return _band_names(self.bands_hz) if axis == "bands_hz" else super(Levels, self).coordinate(axis)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Severity(Value):
@@ -142,6 +174,9 @@ class Severity(Value):
     notes
         What isn't as the standard wants it, in sentences.
     """
+
+    AXES: ClassVar = {"velocity_mm_s": ("channels",), "velocity_std_mm_s": ("channels",)}
+    ROWS: ClassVar = "channels"
 
     channels: tuple[Channel, ...]
     band_hz: tuple[float, float]
@@ -226,6 +261,9 @@ class OctaveLevels(Value):
         ``[channel]``, RMS of the whole spectrum, weighted as the bands are.
     """
 
+    AXES: ClassVar = {"rms": ("channels", "mid_hz"), "std": ("channels", "mid_hz")}
+    ROWS: ClassVar = "mid_hz"
+
     fraction: int
     weighting: str | None
     nominal_hz: Real
@@ -243,6 +281,20 @@ class OctaveLevels(Value):
     def channels(self) -> tuple[Channel, ...]:
         """One for each row of the levels."""
         return self.bands.channels
+
+    @property
+    def rms(self) -> Real:
+        """``[channel, band]``, RMS in each channel's unit."""
+        return self.bands.rms
+
+    @property
+    def std(self) -> Real:
+        """``[channel, band]``, one sigma of it."""
+        return self.bands.std
+
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Give the unit of a channel."""
+        return self.channels[place[0]].unit
 
     def decibels(self) -> Real:
         """Give ``[channel, band]`` in dB over the references of ISO 1683, such as 20 uPa and 1 um/s^2."""

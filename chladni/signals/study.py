@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from chladni.signals.cepstrum import Cepstrum
 from chladni.signals.envelope import EnvelopeSpectrum
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry
@@ -48,6 +49,8 @@ class Study(Drawn):
         Levels in octave bands, one entry a sample rate.
     envelopes
         Envelope spectra, one entry a channel.
+    cepstra
+        Cepstra, one entry a sample rate.
     geometry
         Where the points sit; empty when no setup file was given.
     findings
@@ -70,6 +73,7 @@ class Study(Drawn):
     severities: tuple[Severity, ...] = ()
     octaves: tuple[OctaveLevels, ...] = ()
     envelopes: tuple[EnvelopeSpectrum, ...] = ()
+    cepstra: tuple[Cepstrum, ...] = ()
     geometry: Geometry = field(default_factory=Geometry)
     findings: tuple[str, ...] = ()
     pictures: tuple[tuple[str, bytes], ...] = ()

@@ -6,7 +6,8 @@ from math import frexp, ldexp, nan, sqrt
 
 import numpy as np
 
-from chladni.signals.channel import Channel
+from chladni.io.source import Blocks, SeriesLike, blocks_of, extent_of, log_or_series
+from chladni.signals.channel import Channel, Names
 from chladni.signals.envelope import Bearing, EnvelopeSpectrum, FaultLine, Kurtogram
 from chladni.signals.errors import SetupError
 from chladni.signals.number_range import require_in_range
@@ -14,7 +15,7 @@ from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import power
 from chladni.spectral.accumulator import AutoSpectraAccumulator
 from chladni.spectral.band_filter import BandFilter
-from chladni.spectral.blocks import Source
+from chladni.spectral.blocks import Source, leading_part
 from chladni.spectral.kurtogram import kurtogram
 from chladni.spectral.power_spectral_density import power_spectral_density
 from chladni.spectral.segmentation import plan_segmentation
@@ -32,8 +33,12 @@ LINES_OF_THE_MEAN = 1
 
 
 def envelope(
-    series: TimeSeries,
+    source: SeriesLike,
     *,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
     band_hz: tuple[float, float] | None = None,
     resolution_hz: float | None = None,
     bearing: Bearing | None = None,
@@ -43,8 +48,15 @@ def envelope(
 
     Parameters
     ----------
-    series
-        Mostly accelerations at some 10 kHz.
+    source
+        A log (read block by block when it's large, and twice where bands are to be chosen), the path to one, a series
+        or an array ``[channel, sample]``; mostly accelerations at some 10 kHz.
+    channels
+        Message paths or names; None for all, which must share a sampling grid.
+    sample_rate_hz
+        Samples a second of an array, or of a file that doesn't say it.
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
     band_hz
         Band that is struck, such as a resonance; None takes that of greatest spectral kurtosis, see `kurtogram`.
     resolution_hz
@@ -73,22 +85,50 @@ def envelope(
     --------
     >>> t = np.arange(40_000) / 10_000
     >>> blows = (1 + np.cos(2 * np.pi * 87.0 * t)) * np.sin(2 * np.pi * 3000 * t)
-    >>> x = TimeSeries(values=blows[np.newaxis], sample_rate_hz=1e4, channels=(Channel(name="a", unit="m/s^2"),))
-    >>> (found,) = envelope(x, band_hz=(2500, 3500))
+    >>> (found,) = envelope(blows, sample_rate_hz=1e4, band_hz=(2500, 3500))
     >>> float(found.frequency_hz[np.argmax(found.amplitude * (found.frequency_hz > 5))])
     87.0
     """
     faults_hz = fault_frequencies_hz(bearing, shaft_hz)
-    choices = [BandChoice(band_hz=band_hz)] * len(series.channels) if band_hz else chosen_bands(series, faults_hz)
-    resolution_hz = SEGMENTS / series.duration_s if resolution_hz is None else resolution_hz
-    found = []
-    for channel, choice in zip(series.channels, choices, strict=True):
-        accumulator = EnvelopeAccumulator(
-            channel, series.sample_rate_hz, choice, resolution_hz=resolution_hz, samples=series.samples
+    whole = log_or_series(source, sample_rate_hz=sample_rate_hz)
+
+    def samples() -> TimeSeries | Blocks:
+        return blocks_of(whole, channels=channels, start_s=start_s, end_s=end_s)
+
+    lead, _ = leading_part(samples(), 1)
+    names = [channel.name for channel in lead[0].channels]
+    named = BandChoice(band_hz=band_hz or (0.0, 0.0))
+    choices = dict.fromkeys(names, named) if band_hz else chosen_bands(samples(), faults_hz)
+    _, length_s = extent_of(whole, channels=channels, start_s=start_s, end_s=end_s)
+    return envelope_spectra(samples(), choices, length_s=length_s, resolution_hz=resolution_hz, faults_hz=faults_hz)
+
+
+def envelope_spectra(
+    source: Source,
+    choices: Mapping[str, "BandChoice"],
+    *,
+    length_s: float,
+    resolution_hz: float | None,
+    faults_hz: Mapping[str, float],
+) -> tuple[EnvelopeSpectrum, ...]:
+    """Do the work of `envelope` on a stream of known length, for the channels that have a band."""
+    lead, blocks = leading_part(source, 1)
+    rate_hz = lead[0].sample_rate_hz
+    accumulators = [
+        EnvelopeAccumulator(
+            channel,
+            rate_hz,
+            choices[channel.name],
+            resolution_hz=SEGMENTS / length_s if resolution_hz is None else resolution_hz,
+            samples=round(length_s * rate_hz),
         )
-        accumulator.update(series.select([channel.name]))
-        found.append(accumulator.result(faults_hz))
-    return tuple(found)
+        for channel in lead[0].channels
+        if channel.name in choices
+    ]
+    for block in blocks:
+        for one in accumulators:
+            one.update(block.select([one.channel.name]))
+    return tuple(one.result(faults_hz) for one in accumulators)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -109,13 +149,11 @@ def fault_frequencies_hz(bearing: Bearing | None, shaft_hz: float | None) -> dic
     return {} if bearing is None or shaft_hz is None else bearing.frequencies_hz(shaft_hz)
 
 
-def chosen_bands(source: Source, faults_hz: Mapping[str, float]) -> tuple[BandChoice, ...]:
+def chosen_bands(source: Source, faults_hz: Mapping[str, float]) -> dict[str, BandChoice]:
     """Choose for each channel the band of greatest spectral kurtosis, wide enough for multiples of the faults."""
     found = kurtogram(source)
-    return tuple(
-        _choice(found.select(row), MULTIPLES * max(faults_hz.values(), default=0.0))
-        for row in range(len(found.channels))
-    )
+    width_hz = MULTIPLES * max(faults_hz.values(), default=0.0)
+    return {channel.name: _choice(found.select(row), width_hz) for row, channel in enumerate(found.channels)}
 
 
 def _choice(gram: Kurtogram, least_width_hz: float) -> BandChoice:

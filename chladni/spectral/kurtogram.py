@@ -6,12 +6,14 @@ from itertools import pairwise
 import numpy as np
 import scipy.fft
 
+from chladni.io.source import Blocks, SeriesLike, blocks_of
 from chladni.signals.arrays import Complex, Real
+from chladni.signals.channel import Names
 from chladni.signals.envelope import Kurtogram
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import require_in_range
 from chladni.spectral.accumulator import require_finite
-from chladni.spectral.blocks import Source, leading_part
+from chladni.spectral.blocks import leading_part
 from chladni.spectral.held_samples import HeldSamples
 from chladni.spectral.stretches import Runs
 
@@ -25,13 +27,27 @@ ROLL_OFF = 0.25
 EDGE = 16
 
 
-def kurtogram(source: Source) -> Kurtogram:
+def kurtogram(
+    source: SeriesLike | Blocks,
+    *,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> Kurtogram:
     """Compute the kurtogram of each channel.
 
     Parameters
     ----------
     source
-        A series, or consecutive blocks of one (taken one at a time, so memory doesn't grow with the log).
+        A log (read block by block when it's large), the path to one, a series, an array ``[channel, sample]``, or
+        consecutive blocks of a series.
+    channels
+        Message paths or names; None for all, which must share a sampling grid.
+    sample_rate_hz
+        Samples a second of an array, or of a file that doesn't say it.
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
 
     Returns
     -------
@@ -52,13 +68,11 @@ def kurtogram(source: Source) -> Kurtogram:
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
-    >>> from chladni.signals.time_series import TimeSeries
-    >>> noise = np.random.default_rng(1).standard_normal((1, 20_000))
-    >>> found = kurtogram(TimeSeries(values=noise, sample_rate_hz=1e4, channels=(Channel(name="a"),)))
+    >>> found = kurtogram(np.random.default_rng(1).standard_normal(20_000), sample_rate_hz=1e4)
     >>> found.low_hz.size, bool(abs(found.kurtosis[0, 0]) < 3 * found.std[0, 0])
     (220, True)
     """
+    source = blocks_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     lead, blocks = leading_part(source, 1)
     first, runs, held = lead[0], Runs(), HeldSamples()
     edges = [np.linspace(0.0, 0.5, number + 1) for number in _numbers()]

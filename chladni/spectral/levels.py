@@ -5,15 +5,16 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from chladni.io.source import Blocks, SeriesLike, blocks_of
 from chladni.signals.arrays import Index, Mask, Real, Whole
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.levels import Levels, RunningLevels
 from chladni.signals.number_range import require_in_range
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.spectral.accumulator import require_finite
 from chladni.spectral.band_filter import BandFilter
-from chladni.spectral.blocks import Source, leading_part
+from chladni.spectral.blocks import leading_part
 from chladni.spectral.stretches import valid_runs
 
 # Time constant "fast" of sound and vibration level meters (IEC 61672-1:2013, section 5.8).
@@ -27,8 +28,12 @@ BATCHES = 32
 
 
 def levels(
-    source: Source,
+    source: SeriesLike | Blocks,
     *,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
     bands_hz: Sequence[tuple[float, float]] | None = None,
     running_s: float | None = None,
     integrations: int = 0,
@@ -38,7 +43,14 @@ def levels(
     Parameters
     ----------
     source
-        A series, or consecutive blocks of one (taken one at a time, so memory doesn't grow with the log).
+        A log (read block by block when it's large), the path to one, a series, an array ``[channel, sample]``, or
+        consecutive blocks of a series.
+    channels
+        Message paths or names; None for all, which must share a sampling grid.
+    sample_rate_hz
+        Samples a second of an array, or of a file that doesn't say it.
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
     bands_hz
         Edges of bands; None for all that was sampled, without a filter. See `BandFilter` for what passes.
     running_s
@@ -69,11 +81,11 @@ def levels(
     --------
     >>> t = np.arange(8000) / 1000
     >>> sine = 3.0 + 2.0 * np.sin(2 * np.pi * 25 * t)
-    >>> x = TimeSeries(values=sine[np.newaxis], sample_rate_hz=1000.0, channels=(Channel(name="a", unit="m/s^2"),))
-    >>> found = levels(x)
+    >>> found = levels(sine, sample_rate_hz=1000.0)
     >>> [float(one[0, 0].round(6)) for one in (found.mean, found.rms, found.peak, found.kurtosis)]
     [3.0, 1.414214, 2.0, 1.5]
     """
+    source = blocks_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     lead, blocks = leading_part(source, 1)
     first = lead[0]
     accumulator = LevelsAccumulator(
@@ -142,7 +154,7 @@ class LevelsAccumulator:
         one = _Moments._make(array[..., 0] for array in whole)
         return Levels(
             channels=self._passed,
-            bands_hz=tuple(one.band_hz for one in self._filters) or ((0.0, self.sample_rate_hz / 2),),
+            bands_hz=self._bands_hz(),
             samples=one.samples.astype(np.int64),
             mean=np.where(one.samples > 0, one.mean, np.nan),
             rms=one.rms,
@@ -161,6 +173,9 @@ class LevelsAccumulator:
         windows.add(series, round(start_s * self.sample_rate_hz))
         self._passed = series.channels
 
+    def _bands_hz(self) -> tuple[tuple[float, float], ...]:
+        return tuple(one.band_hz for one in self._filters) or ((0.0, self.sample_rate_hz / 2),)
+
     def _running(self, samples: int) -> RunningLevels:
         numbers = np.unique(np.concatenate([windows.number for windows in self._windows]))
         moments = _stacked([windows.at(numbers) for windows in self._windows])
@@ -170,6 +185,8 @@ class LevelsAccumulator:
             rms=moments.rms,
             peak=moments.peak,
             kurtosis=moments.kurtosis,
+            channels=self._passed,
+            bands_hz=self._bands_hz(),
             start_time_ns=self._start_ns or 0,
         )
 

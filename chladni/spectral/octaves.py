@@ -6,7 +6,9 @@ from typing import Literal
 
 import numpy as np
 
+from chladni.io.source import SeriesLike, blocks_of, extent_of, log_or_series
 from chladni.signals.arrays import Real
+from chladni.signals.channel import Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.levels import OctaveLevels
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -179,8 +181,12 @@ def attenuation_limits(ratio: Real, *, performance_class: int, fraction: int = 3
 
 
 def octaves(
-    source: TimeSeries | PowerSpectralDensity,
+    source: SeriesLike | PowerSpectralDensity,
     *,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
     fraction: int = 3,
     weighting: Weighting | None = None,
     low_hz: float | None = None,
@@ -191,7 +197,14 @@ def octaves(
     Parameters
     ----------
     source
-        A series, averaged with lines fine enough for its lowest band; or densities, taken as they are.
+        A log (read block by block when it's large), the path to one, a series or an array ``[channel, sample]``,
+        averaged with lines fine enough for the lowest band; or densities, taken as they are.
+    channels
+        Message paths or names; None for all, which must share a sampling grid.
+    sample_rate_hz
+        Samples a second of an array, or of a file that doesn't say it.
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
     fraction
         Bands in an octave: 1, 3, 12 or any number up to 24.
     weighting
@@ -213,19 +226,20 @@ def octaves(
 
     Examples
     --------
-    >>> from chladni.signals.channel import Channel
     >>> tone = np.sqrt(2) * np.sin(2 * np.pi * 1000 * np.arange(48_000) / 12_000)  # 1 Pa, 94 dB
-    >>> x = TimeSeries(values=tone[np.newaxis], sample_rate_hz=12e3, channels=(Channel(name="a", unit="Pa"),))
+    >>> x = TimeSeries.from_arrays(tone, sample_rate_hz=12e3, units="Pa")
     >>> found = octaves(x, fraction=1, weighting="A")
     >>> dict(zip(found.nominal_hz.tolist(), found.decibels()[0].round(1).tolist()))[1000.0]
     94.0
     """
-    if isinstance(source, TimeSeries):
-        resolution_hz = octave_resolution_hz(
-            source.sample_rate_hz, source.duration_s, fraction=fraction, low_hz=low_hz
-        )
+    if not isinstance(source, PowerSpectralDensity):
+        found = log_or_series(source, sample_rate_hz=sample_rate_hz)
+        rate_hz, length_s = extent_of(found, channels=channels, start_s=start_s, end_s=end_s)
+        resolution_hz = octave_resolution_hz(rate_hz, length_s, fraction=fraction, low_hz=low_hz)
         low_hz = lowest_band_hz(resolution_hz, fraction=fraction) if low_hz is None else low_hz
-        source = octave_density(source, resolution_hz=resolution_hz)
+        source = octave_density(
+            blocks_of(found, channels=channels, start_s=start_s, end_s=end_s), resolution_hz=resolution_hz
+        )
     density = source if weighting is None else _weighted(source, weighting)
     frequency_hz = density.frequency_hz
     spacing_hz = float(np.median(np.diff(frequency_hz)))

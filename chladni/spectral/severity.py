@@ -1,16 +1,18 @@
 """Vibration severity after ISO 20816-3: RMS of velocity from 10 to 1000 Hz, and its zone."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
 
-from chladni.signals.channel import Channel
+from chladni.io.source import Blocks, SeriesLike, blocks_of
+from chladni.signals.channel import Channel, Names
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.levels import Levels, RunningLevels, Severity
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import shown
-from chladni.spectral.blocks import Source, leading_part
+from chladni.spectral.blocks import leading_part
 from chladni.spectral.levels import LevelsAccumulator
 
 Machine = Literal["large-rigid", "large-flexible", "medium-rigid", "medium-flexible"]
@@ -33,14 +35,29 @@ _INTEGRATIONS = {"m/s^2": 1, "m/s": 0}
 MM_PER_M = 1e3
 
 
-def severity(source: Source, *, machine: Machine | None = None, slow: bool = False) -> Severity:
+def severity(
+    source: SeriesLike | Blocks,
+    *,
+    channels: Names | None = None,
+    sample_rate_hz: float | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+    machine: Machine | None = None,
+    slow: bool = False,
+) -> Severity:
     """Measure vibration severity: the RMS of velocity from 10 to 1000 Hz, in mm/s.
 
     Parameters
     ----------
     source
-        A series, or consecutive blocks of one; its accelerations (m/s^2) and velocities (m/s) are judged, others are
-        left out.
+        A log (read block by block when it's large), the path to one, a series, an array ``[channel, sample]``, or
+        consecutive blocks of a series. Its accelerations (m/s^2) and velocities (m/s) are judged, others left out.
+    channels
+        Message paths or names; None for all, which must share a sampling grid.
+    sample_rate_hz
+        Samples a second of an array, or of a file that doesn't say it.
+    start_s, end_s
+        Only samples with ``start_s <= t < end_s``, seconds from the start.
     machine
         ``large-rigid``, ``large-flexible``, ``medium-rigid`` or ``medium-flexible``: class and foundation, for the
         zone. Large is above 300 kW, or an electrical machine with a shaft 315 mm high or more; medium is above 15 kW,
@@ -67,11 +84,12 @@ def severity(source: Source, *, machine: Machine | None = None, slow: bool = Fal
     --------
     >>> t = np.arange(40_000) / 10_000
     >>> tone = 9.8 * np.sin(2 * np.pi * 24.9 * t)  # 9.8 / (2 pi 24.9) / sqrt(2) = 44.3 mm/s
-    >>> x = TimeSeries(values=tone[np.newaxis], sample_rate_hz=1e4, channels=(Channel(name="a", unit="m/s^2"),))
+    >>> x = TimeSeries.from_arrays(tone, sample_rate_hz=1e4, units="m/s^2")
     >>> found = severity(x, machine="large-rigid")
     >>> float(found.velocity_mm_s[0].round(1)), found.zones
     (44.3, ('D',))
     """
+    source = blocks_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     lead, blocks = leading_part(source, 1)
     accumulator = SeverityAccumulator(lead[0].channels, lead[0].sample_rate_hz, machine=machine, slow=slow)
     for block in blocks:
@@ -154,15 +172,11 @@ def is_motion(channel: Channel) -> bool:
 
 def _joined(found: Sequence[Levels]) -> RunningLevels:
     """Running levels of all; each has the windows of the others, since they saw the same blocks by one filter."""
-    first = found[0].running
-    rms, peak, kurtosis = (
-        np.concatenate([getattr(one.running, name) for one in found]) for name in ("rms", "peak", "kurtosis")
-    )
-    return RunningLevels(
-        window_s=first.window_s,
-        time_s=first.time_s,
-        rms=rms,
-        peak=peak,
-        kurtosis=kurtosis,
-        start_time_ns=first.start_time_ns,
+    running = [one.running for one in found]
+    return replace(
+        running[0],
+        rms=np.concatenate([one.rms for one in running]),
+        peak=np.concatenate([one.peak for one in running]),
+        kurtosis=np.concatenate([one.kurtosis for one in running]),
+        channels=tuple(channel for one in running for channel in one.channels),
     )

@@ -127,6 +127,8 @@ def _channels(study: Study) -> Iterator[Channel]:
     for octaves in study.octaves:
         yield from octaves.channels
     yield from (envelope.channel for envelope in study.envelopes)
+    for cepstrum in study.cepstra:
+        yield from cepstrum.channels
     if study.response is not None:
         yield from (*study.response.references, *study.response.responses)
     if study.modes is not None:

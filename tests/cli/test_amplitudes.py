@@ -42,6 +42,7 @@ INSIDE = [1e-59, *(pytest.param(size, marks=pytest.mark.nightly) for size in (1e
 Verb = Callable[[Path, Path, Path], list[object]]
 VERBS: dict[str, Verb] = {
     "levels": lambda log, folder, _: ["levels", log, "--json", folder / "o.json"],
+    "cepstrum": lambda log, folder, _: ["cepstrum", log, "--json", folder / "o.json"],
     "envelope": lambda log, folder, _: ["envelope", log, "--json", folder / "o.json"],
     "octaves": lambda log, folder, _: ["octaves", log, "--json", folder / "o.json"],
     "psd": lambda log, folder, _: ["psd", log, "--json", folder / "o.json"],

@@ -45,8 +45,8 @@ def test_a_band_can_be_named_and_a_large_log_is_read_block_by_block(run, log, mo
     for arguments in (("--band", 3500, 5000), ()):
         whole = run("envelope", log, *arguments, "--json", "-").document["channels"][0]
         with monkeypatch.context() as patch:
-            patch.setattr("chladni.apps.sources.IN_MEMORY_BYTES", 0)
-            patch.setattr("chladni.apps.sources.VALUES_IN_A_BLOCK", 30_000)
+            patch.setattr("chladni.io.source.IN_MEMORY_BYTES", 0)
+            patch.setattr("chladni.io.source.VALUES_IN_A_BLOCK", 30_000)
             parts = run("envelope", log, *arguments, "--json", "-").document["channels"][0]
         assert (parts["low_hz"], parts["high_hz"]) == (whole["low_hz"], whole["high_hz"])
         assert parts["amplitude"] == pytest.approx(whole["amplitude"], rel=1e-6)

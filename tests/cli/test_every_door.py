@@ -53,6 +53,8 @@ def _bare(series: TimeSeries, path: Path) -> None:
     np.savetxt(path, series.values.T, delimiter=",", header="force,tip", comments="")
 
 
+#: Commands that measure each channel by itself.
+SPECTRA = ("levels", "psd", "octaves", "envelope", "cepstrum")
 UNITS = ("--read", "units=force:N,tip:m/s^2")
 KINDS: dict[str, tuple[Callable[[TimeSeries, Path], object], tuple[object, ...]]] = {
     "table.csv": (write_csv, ()),
@@ -95,6 +97,7 @@ def plain(document: Any) -> Any:
         ("levels", ("--channel", "tip", "--start", 4, "--band", 20, 100)),
         ("octaves", ("--channel", "tip")),
         ("envelope", ("--channel", "tip", "--band", 40, 80)),
+        ("cepstrum", ("--channel", "tip")),
         ("frf", ()),
         ("frf", ("--reference", "force", "--response", "tip")),
         ("modes", ("--band", 40, 80)),
@@ -226,7 +229,8 @@ def test_a_model_is_driven_by_a_data_file(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["info", "levels", "psd", "octaves", "envelope", "frf", "modes", "view", "compare", "gap", "convert"]
+    "command",
+    ["info", "levels", "psd", "octaves", "envelope", "cepstrum", "frf", "modes", "view", "compare", "gap", "convert"],
 )
 def test_a_rate_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command: str) -> None:
     _bare(measured(), tmp_path / "bare.csv")
@@ -246,7 +250,9 @@ def test_a_rate_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command
     assert "rate" not in told.err
 
 
-@pytest.mark.parametrize("command", ["info", "levels", "psd", "octaves", "envelope", "frf", "modes", "view"])
+@pytest.mark.parametrize(
+    "command", ["info", "levels", "psd", "octaves", "envelope", "cepstrum", "frf", "modes", "view"]
+)
 def test_a_time_unit_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command: str) -> None:
     series = measured()
     table = np.column_stack([1000 * series.times_s(), series.values.T])
@@ -284,7 +290,7 @@ def test_what_is_not_read_is_told_by_every_command(run: Run, tmp_path: Path) -> 
     write_uff(measured(), tmp_path / "records.uff")
     path = tmp_path / "a.uff"
     path.write_bytes((tmp_path / "records.uff").read_bytes() + text_set(kind=9).encode())
-    for command in ("info", "levels", "psd", "octaves", "envelope", "frf", "modes"):
+    for command in (*SPECTRA, "info", "frf", "modes"):
         outcome = run(command, path)
         assert outcome.code == 0, outcome.err
         assert "power spectral density (1): not read" in " ".join(outcome.out.split())
@@ -333,7 +339,7 @@ def test_functions_are_compared(run: Run, functions: Path) -> None:
     assert {one["fate"] for one in outcome.document["response_peaks"]} == {"unchanged"}
 
 
-@pytest.mark.parametrize("command", ["levels", "psd", "octaves", "envelope", "gap", "convert", "modes"])
+@pytest.mark.parametrize("command", [*SPECTRA, "gap", "convert", "modes"])
 def test_commands_for_samples_say_what_the_file_holds(
     run: Run, functions: Path, tmp_path: Path, command: str
 ) -> None:

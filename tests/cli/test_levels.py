@@ -96,8 +96,8 @@ def test_a_log_too_slow_or_too_short_for_severity_has_its_levels_all_the_same(ru
 
 def test_a_large_log_is_measured_block_by_block(run, arm_log, monkeypatch):
     whole = run("levels", arm_log, "--json", "-").document
-    monkeypatch.setattr("chladni.apps.sources.IN_MEMORY_BYTES", 0)
-    monkeypatch.setattr("chladni.apps.sources.VALUES_IN_A_BLOCK", 10_000)
+    monkeypatch.setattr("chladni.io.source.IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr("chladni.io.source.VALUES_IN_A_BLOCK", 10_000)
     parts = run("levels", arm_log, "--json", "-").document
     for one, other in zip(whole["channels"], parts["channels"], strict=True):
         assert other["name"] == one["name"]

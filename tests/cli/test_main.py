@@ -12,7 +12,19 @@ from chladni.io.mcap_log import McapLog
 def test_help_names_every_command(run):
     outcome = run("--help")
     assert outcome.code == SUCCESS
-    for command in ("info", "levels", "psd", "octaves", "envelope", "frf", "view", "compare", "convert", "demo"):
+    for command in (
+        "info",
+        "levels",
+        "psd",
+        "octaves",
+        "envelope",
+        "cepstrum",
+        "frf",
+        "view",
+        "compare",
+        "convert",
+        "demo",
+    ):
         assert f"\n  {command} " in outcome.out
 
 

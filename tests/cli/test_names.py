@@ -103,6 +103,7 @@ def commands(path: Path, folder: Path) -> Iterator[tuple[object, ...]]:
     yield "psd", path
     yield "levels", path, "--csv", folder / "l.csv", "--figures", folder
     yield "octaves", path, "--figures", folder
+    yield "cepstrum", path, "--figures", folder
     yield "envelope", path, "--band", 20, 40, "--figures", folder
     yield "frf", path, "--reference", force, "--response", motion
     yield ("modes", path, "--reference", force, "--channel", motion, "--count", 1, "--csv", folder / "m.csv",

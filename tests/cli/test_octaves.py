@@ -48,8 +48,8 @@ def test_people_get_a_table_a_quantity(run, log, tmp_path, fraction, called):
 
 def test_a_large_log_is_averaged_block_by_block(run, log, monkeypatch):
     whole = run("octaves", log, "--json", "-").document
-    monkeypatch.setattr("chladni.apps.sources.IN_MEMORY_BYTES", 0)
-    monkeypatch.setattr("chladni.apps.sources.VALUES_IN_A_BLOCK", 10_000)
+    monkeypatch.setattr("chladni.io.source.IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr("chladni.io.source.VALUES_IN_A_BLOCK", 10_000)
     parts = run("octaves", log, "--json", "-").document
     for one, other in zip(whole["channels"], parts["channels"], strict=True):
         assert [band["rms"] for band in other["bands"]] == pytest.approx([band["rms"] for band in one["bands"]])

@@ -70,6 +70,7 @@ def test_standard_output_and_what_was_not_given_are_no_files(
     [
         ["info", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["levels", "{log}", "--setup", "{other}", "--csv", "{other}"],
+        ["cepstrum", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["envelope", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["octaves", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["psd", "{log}", "--setup", "{other}", "--json", "{other}"],

@@ -100,3 +100,26 @@ def test_what_is_no_table_is_refused(tmp_path):
     )
     with pytest.raises(chladni.SetupError, match="a ModalScale is no table"):
         scale.to_csv(tmp_path / "scale.csv")
+
+
+def test_levels_and_bands_are_tables_of_their_channels():
+    pytest.importorskip("pandas", reason="needs the extra [pandas]")
+    time_s = np.arange(20_000) / 1000
+    both = chladni.TimeSeries.from_arrays(
+        {"f": np.sin(300 * time_s), "a": 2 * np.sin(500 * time_s)},
+        sample_rate_hz=1000.0,
+        units={"f": "N", "a": "m/s^2"},
+    )
+    found = chladni.levels(both, bands_hz=[(20.0, 60.0), (60.0, 200.0)])
+    frame = found.to_pandas()
+    assert list(frame.index) == ["f", "a"]
+    assert frame.columns[0] == "20 to 60 Hz"
+    np.testing.assert_array_equal(frame["60 to 200 Hz"], found.rms[:, 1])
+    np.testing.assert_array_equal(frame["60 to 200 Hz kurtosis"], found.kurtosis[:, 1])
+    running = found.running.to_pandas()
+    assert running.attrs["units"]["a / 20 to 60 Hz"] == "m/s^2"
+    np.testing.assert_array_equal(running["a / 20 to 60 Hz"], found.running.rms[1, 0])
+    octaves = chladni.octaves(both, fraction=1)
+    np.testing.assert_array_equal(octaves.to_pandas()["a std"], octaves.bands.std[1])
+    (envelope, _) = chladni.envelope(both, band_hz=(50.0, 200.0))
+    assert envelope.to_pandas().attrs["units"] == {"amplitude": "N^2"}

@@ -45,6 +45,13 @@ VALUES = {
     "waterfall": (lambda: chladni.waterfall(series(), channels="a"), 2),
     "modes": (modes, 2),
     "mac": (lambda: chladni.mac(modes()), 2),
+    "levels": (lambda: chladni.levels(series(), channels="a"), 2),
+    "running levels": (lambda: chladni.levels(series(), channels="a").running, 1),
+    "severity": (lambda: chladni.severity(series(), machine="medium-rigid"), 1),
+    "octaves": (lambda: chladni.octaves(series(), channels="a"), 1),
+    "envelope": (lambda: chladni.envelope(series(), channels="a", band_hz=(20.0, 80.0))[0], 1),
+    "kurtogram": (lambda: chladni.kurtogram(series(), channels="a"), 2),
+    "cepstrum": (lambda: chladni.cepstrum(series(), channels="a"), 1),
 }
 
 
@@ -65,7 +72,7 @@ def test_a_picture_goes_into_given_axes_or_is_refused(make, axes):
             chladni.plot(make(), ax)
     else:
         assert chladni.plot(make(), ax) is ax
-        assert ax.lines or ax.images
+        assert ax.lines or ax.images or ax.patches or ax.collections
 
 
 def test_a_density_is_drawn_as_it_is():

@@ -4,6 +4,7 @@ Importing this package costs half a second, so it's imported where a figure is w
 """
 
 from chladni.viewers.figures.album import Album
+from chladni.viewers.figures.cepstrum import cepstrum_figures
 from chladni.viewers.figures.comparison import comparison_figures
 from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
@@ -23,6 +24,7 @@ from chladni.viewers.figures.waveforms import waveform_figures
 
 __all__ = [
     "Album",
+    "cepstrum_figures",
     "comparison_figures",
     "complexity_figures",
     "cross_mac_figure",

@@ -6,6 +6,7 @@ from typing import Self
 from matplotlib.figure import Figure
 
 from chladni.signals.study import Study
+from chladni.viewers.figures.cepstrum import cepstrum_figures
 from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.envelope import envelope_figures
@@ -45,6 +46,7 @@ class Album:
                 "levels": level_figures(study),
                 "octaves": octave_figures(study),
                 "envelopes": envelope_figures(study),
+                "cepstra": cepstrum_figures(study),
                 "densities": density_figures(study),
                 "responses": response_figures(study),
                 "nyquist": nyquist_figures(study),

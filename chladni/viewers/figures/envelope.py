@@ -28,22 +28,30 @@ def envelope_figures(study: Study) -> dict[str, Figure]:
         return {f"envelope {place}": _figure(one, style) for place, one in enumerate(study.envelopes, start=1)}
 
 
+def envelope_label(found: EnvelopeSpectrum) -> str:
+    """Say what runs along the axis of a picture of an envelope spectrum."""
+    return f"Frequency [Hz], envelope of {_hertz(found.band_hz[0])} to {_hertz(found.band_hz[1])} Hz"
+
+
 def _figure(found: EnvelopeSpectrum, style: Style) -> Figure:
     heights = [SPECTRUM_IN] if found.kurtogram is None else [KURTOGRAM_IN, SPECTRUM_IN]
     figure, stack = sheet(heights)
     if found.kurtogram is not None:
-        _kurtogram(figure, stack[0], found.kurtogram, found.band_hz)
+        draw_kurtogram(stack[0], gram=found.kurtogram, band_hz=found.band_hz)
+        stack[0].set_xlabel("Frequency [Hz]")
     stack[0].set_title(plain(style.labels[found.channel.name]), loc="left", pad=3)
-    _spectrum(stack[-1], found, style)
+    draw_envelope(stack[-1], found=found, style=style)
+    stack[-1].set_xlabel(envelope_label(found))
     return figure
 
 
-def _kurtogram(figure: Figure, axes: Axes, gram: Kurtogram, band_hz: tuple[float, float]) -> None:
-    # A row for each width, the widest above, as everywhere in the field.
+def draw_kurtogram(axes: Axes, gram: Kurtogram, band_hz: tuple[float, float], *, row: int = 0) -> None:
+    """Draw a channel's kurtogram, and frame a band."""
+    # A level for each width, the widest above, as everywhere in the field.
     widths = np.round(np.log2((gram.high_hz[0] - gram.low_hz[0]) / (gram.high_hz - gram.low_hz)), 6)
-    rows = np.unique(widths, return_inverse=True)[1]
-    boxes = [_box(low, high, row) for low, high, row in zip(gram.low_hz, gram.high_hz, rows, strict=True)]
-    values = gram.kurtosis[0]
+    levels = np.unique(widths, return_inverse=True)[1]
+    boxes = [_box(low, high, level) for low, high, level in zip(gram.low_hz, gram.high_hz, levels, strict=True)]
+    values = gram.kurtosis[row]
     bands = PolyCollection(boxes, array=values, cmap=mpl.colormaps["viridis"], linewidths=0)
     bands.set_clim(0.0, max(float(values.max()), 0.1))
     axes.add_collection(bands)
@@ -51,13 +59,12 @@ def _kurtogram(figure: Figure, axes: Axes, gram: Kurtogram, band_hz: tuple[float
     frame = PolyCollection([boxes[chosen]], facecolors="none", edgecolors=[paint(FRAME)], linewidths=1.4)
     axes.add_collection(frame)
     axes.set_xlim(0.0, gram.high_hz[0])
-    axes.set_ylim(rows.max() + 0.5, -0.5)
-    ticks = list(range(0, rows.max() + 1, 3))
-    axes.set_yticks(ticks, [_hertz(float((gram.high_hz - gram.low_hz)[rows == row][0])) for row in ticks])
+    axes.set_ylim(levels.max() + 0.5, -0.5)
+    ticks = list(range(0, levels.max() + 1, 3))
+    axes.set_yticks(ticks, [_hertz(float((gram.high_hz - gram.low_hz)[levels == level][0])) for level in ticks])
     axes.set_ylabel("Width [Hz]")
-    axes.set_xlabel("Frequency [Hz]")
     axes.grid(visible=False)
-    bar = figure.colorbar(bands, ax=axes, pad=0.02, aspect=12)
+    bar = axes.figure.colorbar(bands, ax=axes, pad=0.02, aspect=12)
     bar.set_label("Spectral kurtosis")
     bar.outline.set_linewidth(0.0)
 
@@ -66,7 +73,8 @@ def _box(low_hz: float, high_hz: float, row: int) -> list[tuple[float, float]]:
     return [(low_hz, row - 0.5), (high_hz, row - 0.5), (high_hz, row + 0.5), (low_hz, row + 0.5)]
 
 
-def _spectrum(axes: Axes, found: EnvelopeSpectrum, style: Style) -> None:
+def draw_envelope(axes: Axes, found: EnvelopeSpectrum, style: Style) -> None:
+    """Draw a squared envelope spectrum, with the frequencies of a bearing."""
     frequency_hz, amplitude = found.frequency_hz, found.amplitude
     highest_hz = ROOM * max((fault.expected_hz for fault in found.faults), default=0.0)
     end_hz = min(highest_hz or frequency_hz[min(MOST_LINES, frequency_hz.size - 1)], float(frequency_hz[-1]))
@@ -76,7 +84,6 @@ def _spectrum(axes: Axes, found: EnvelopeSpectrum, style: Style) -> None:
     axes.plot(frequency_hz[shown], amplitude[shown], color=paint(style.on_light(found.channel)))
     axes.set_xlim(0.0, end_hz)
     axes.set_ylim(0.0, 1.05 * top)
-    axes.set_xlabel(f"Frequency [Hz], envelope of {_hertz(found.band_hz[0])} to {_hertz(found.band_hz[1])} Hz")
     axes.set_ylabel(f"Squared envelope [{printed_unit(found.density.channels[0].unit)}]")
 
 

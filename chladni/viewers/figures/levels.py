@@ -47,29 +47,61 @@ def level_figures(study: Study) -> dict[str, Figure]:
 
 def _figure(levels: Levels, column: int, group: Group, style: Style) -> Figure:
     figure, (above, below) = sheet(HEIGHTS_IN, sharex=True)
-    running = levels.running
-    time_s, shown = _time_s(running, style), running.kurtosis[list(group.rows), column]
+    draw_strength(above, levels=levels, column=column, group=group, style=style)
+    draw_kurtosis(below, levels=levels, column=column, group=group, style=style)
+    below.set_xlabel(levels_label(levels, column))
+    return figure
+
+
+def draw_strength(axes: Axes, levels: Levels, column: int, group: Group, style: Style) -> None:
+    """Draw RMS, and pale the peak, of some channels in one band over time."""
+    running, time_s = levels.running, _time_s(levels.running, style)
     for row in group.rows:
         channel = levels.channels[row]
         colour = paint(style.on_light(channel))
-        _line(above, time_s, running.rms[row, column], color=colour, label=plain(style.labels[channel.name]))
-        _line(above, time_s, running.peak[row, column], color=colour, alpha=PEAK_OPACITY, linewidth=0.6)
-        _line(below, time_s, running.kurtosis[row, column], color=colour)
+        _line(axes, time_s, running.rms[row, column], color=colour, label=plain(style.labels[channel.name]))
+        _line(axes, time_s, running.peak[row, column], color=colour, alpha=PEAK_OPACITY, linewidth=0.6)
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(f"RMS, peak [{printed_unit(group.unit)}]")
+    _span(axes, running, style)
+    legend(axes)
+
+
+def draw_kurtosis(axes: Axes, levels: Levels, column: int, group: Group, style: Style) -> None:
+    """Draw the kurtosis of some channels in one band over time, with that of Gaussian noise."""
+    running, time_s = levels.running, _time_s(levels.running, style)
+    for row in group.rows:
+        colour = paint(style.on_light(levels.channels[row]))
+        _line(axes, time_s, running.kurtosis[row, column], color=colour)
+    # Never below 1; from single blows it reaches hundreds.
+    highest = float(np.nanmax(running.kurtosis[list(group.rows), column], initial=0.0))
+    logarithmic(axes, 1.0, max(10.0, 1.3 * highest))
+    axes.axhline(GAUSSIAN_KURTOSIS, color="#777777", linewidth=0.6, linestyle="--")
+    axes.set_ylabel("Kurtosis")
+    _span(axes, running, style)
+
+
+def levels_label(levels: Levels, column: int) -> str:
+    """Say what runs along the axis of a picture of levels."""
     low_hz, high_hz = levels.bands_hz[column]
-    above.set_ylim(bottom=0.0)
-    above.set_ylabel(f"RMS, peak [{printed_unit(group.unit)}]")
-    # Never below 1; from single pulses it reaches hundreds.
-    logarithmic(below, 1.0, max(10.0, 1.3 * float(np.nanmax(shown, initial=0.0))))
-    below.axhline(GAUSSIAN_KURTOSIS, color="#777777", linewidth=0.6, linestyle="--")
-    below.set_ylabel("Kurtosis")
-    below.set_xlabel(f"Time [s], windows of {running.window_s:.3g} s, {low_hz:.4g} to {high_hz:.4g} Hz")
-    _span(below, running, style)
-    legend(above)
-    return figure
+    return f"Time [s], windows of {levels.running.window_s:.3g} s, {low_hz:.4g} to {high_hz:.4g} Hz"
 
 
 def _severity_figure(severity: Severity, group: Group, style: Style) -> Figure:
     figure, (axes,) = sheet([SEVERITY_HEIGHT_IN])
+    draw_severity(axes, severity=severity, group=group, style=style)
+    axes.set_xlabel(severity_label(severity))
+    return figure
+
+
+def severity_label(severity: Severity) -> str:
+    """Say what runs along the axis of a picture of severity."""
+    low_hz, high_hz = severity.band_hz
+    return f"Time [s], windows of {severity.running.window_s:.3g} s, {low_hz:.4g} to {high_hz:.4g} Hz"
+
+
+def draw_severity(axes: Axes, severity: Severity, group: Group, style: Style) -> None:
+    """Draw the RMS of velocity over time, on the zones of the machine's class."""
     time_s = _time_s(severity.running, style)
     top = 0.0
     for row in group.rows:
@@ -80,13 +112,8 @@ def _severity_figure(severity: Severity, group: Group, style: Style) -> Figure:
         _line(axes, time_s, rms_mm_s, color=paint(style.on_light(channel)), label=plain(style.labels[channel.name]))
     _zones(axes, severity.boundaries_mm_s, top)
     axes.set_ylabel("Velocity RMS [mm/s]")
-    axes.set_xlabel(
-        f"Time [s], windows of {severity.running.window_s:.3g} s, "
-        f"{severity.band_hz[0]:.4g} to {severity.band_hz[1]:.4g} Hz"
-    )
     _span(axes, severity.running, style)
     legend(axes)
-    return figure
 
 
 def _zones(axes: Axes, boundaries: tuple[float, ...], top: float) -> None:

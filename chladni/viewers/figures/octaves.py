@@ -35,6 +35,18 @@ def octave_figures(study: Study) -> dict[str, Figure]:
 
 def _figure(found: OctaveLevels, group: Group, style: Style) -> Figure:
     figure, (axes,) = sheet([HEIGHT_IN])
+    draw_octaves(axes, found=found, group=group, style=style)
+    axes.set_xlabel(octaves_label(found))
+    return figure
+
+
+def octaves_label(found: OctaveLevels) -> str:
+    """Say what runs along the axis of a picture of octave bands."""
+    return f"{'Octave' if found.fraction == 1 else f'1/{found.fraction} octave'} bands [Hz]"
+
+
+def draw_octaves(axes: Axes, found: OctaveLevels, group: Group, style: Style) -> None:
+    """Draw the levels of some channels, each as wide as its band."""
     weighted = f", {found.weighting}-weighted" if found.weighting else ""
     rows = list(group.rows)
     if group.unit == "Pa":
@@ -57,10 +69,7 @@ def _figure(found: OctaveLevels, group: Group, style: Style) -> Figure:
         axes.stairs(shown, edges_hz, baseline=None, color=paint(style.on_light(channel)), linewidth=1.1,
                     label=plain(style.labels[channel.name]))  # fmt: skip
     _band_axis(axes, found.mid_hz, found.nominal_hz, edges_hz)
-    name = "Octave" if found.fraction == 1 else f"1/{found.fraction} octave"
-    axes.set_xlabel(f"{name} bands [Hz]")
     legend(axes)
-    return figure
 
 
 def _band_axis(axes: Axes, mid_hz: Real, nominal_hz: Real, edges_hz: Real) -> None:

@@ -13,9 +13,12 @@ from matplotlib.figure import Figure
 
 from chladni.models.core.reading import Chart, InfluenceTable, InstrumentReading
 from chladni.models.core.simulation import Simulation
+from chladni.signals.cepstrum import Cepstrum
 from chladni.signals.coherence import Coherence
+from chladni.signals.envelope import EnvelopeSpectrum, Kurtogram
 from chladni.signals.errors import SetupError
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.levels import Levels, OctaveLevels, Severity
 from chladni.signals.modal_assurance import ModalAssurance
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -25,7 +28,16 @@ from chladni.signals.time_series import TimeSeries
 from chladni.signals.value import Value
 from chladni.signals.waterfall import Waterfall
 from chladni.viewers.drawing import thin
-from chladni.viewers.figures import density, frequency_response, influence, waterfall
+from chladni.viewers.figures import (
+    cepstrum,
+    density,
+    envelope,
+    frequency_response,
+    influence,
+    levels,
+    octaves,
+    waterfall,
+)
 from chladni.viewers.figures.chart import chart_height_in, draw_chart
 from chladni.viewers.figures.mac import draw_mac, name_cells
 from chladni.viewers.figures.sheet import WIDTH_IN, legend, look, paint, plain
@@ -150,6 +162,82 @@ def _(value: FrequencyResponse) -> list[Picture]:
 def _(value: Coherence) -> list[Picture]:
     style = Style.of_channels(value.responses)
     return [Picture((Part(LINES_IN, partial(_draw_coherence, coherence=value, style=style)),), "Frequency [Hz]")]
+
+
+@pictures.register
+def _(value: Levels) -> list[Picture]:
+    style = Style.of_channels(value.channels, origin_ns=value.running.start_time_ns)
+    return [
+        Picture(
+            tuple(
+                Part(height_in, partial(draw, levels=value, column=column, group=group, style=style))
+                for draw, height_in in zip(
+                    (levels.draw_strength, levels.draw_kurtosis), levels.HEIGHTS_IN, strict=True
+                )
+            ),
+            levels.levels_label(value, column),
+        )
+        for column in range(len(value.bands_hz))
+        for group in groups(value.channels)
+    ]
+
+
+@pictures.register
+def _(value: Severity) -> list[Picture]:
+    style = Style.of_channels(value.channels, origin_ns=value.running.start_time_ns)
+    return [
+        Picture(
+            (
+                Part(
+                    levels.SEVERITY_HEIGHT_IN, partial(levels.draw_severity, severity=value, group=group, style=style)
+                ),
+            ),
+            levels.severity_label(value),
+        )
+        for group in groups(value.channels)
+    ]
+
+
+@pictures.register
+def _(value: OctaveLevels) -> list[Picture]:
+    style = Style.of_channels(value.channels)
+    return [
+        Picture(
+            (Part(octaves.HEIGHT_IN, partial(octaves.draw_octaves, found=value, group=group, style=style)),),
+            octaves.octaves_label(value),
+        )
+        for group in groups(value.channels)
+    ]
+
+
+@pictures.register
+def _(value: EnvelopeSpectrum) -> list[Picture]:
+    style = Style.of_channels([value.channel])
+    draw = partial(envelope.draw_envelope, found=value, style=style)
+    return [Picture((Part(envelope.SPECTRUM_IN, draw),), envelope.envelope_label(value))]
+
+
+@pictures.register
+def _(value: Cepstrum) -> list[Picture]:
+    style = Style.of_channels(value.channels)
+    return [
+        Picture(
+            (Part(cepstrum.HEIGHT_IN, partial(cepstrum.draw_cepstrum, found=value, row=row, style=style)),),
+            cepstrum.X_LABEL,
+        )
+        for row in range(len(value.channels))
+    ]
+
+
+@pictures.register
+def _(value: Kurtogram) -> list[Picture]:
+    found = []
+    for row in range(len(value.channels)):
+        best = value.best(row)
+        band_hz = (float(value.low_hz[best]), float(value.high_hz[best]))
+        draw = partial(envelope.draw_kurtogram, gram=value, band_hz=band_hz, row=row)
+        found.append(Picture((Part(envelope.KURTOGRAM_IN, draw),), "Frequency [Hz]"))
+    return found
 
 
 @pictures.register

@@ -41,6 +41,7 @@ def _sections(album: Album) -> dict[str, list[tuple[str, str]]]:
         "Levels": captioned("levels", "Solid: RMS of each window. Pale: its peak about the mean."),
         "Octave bands": captioned("octaves", "Summed from spectral lines."),
         "Envelope spectra": captioned("envelopes", "Dashed: frequencies of the bearing, and their multiples."),
+        "Cepstra": captioned("cepstra", "Grey: three sigma of what scatter makes. Dots: what stands out of it."),
         "Power spectral densities": captioned("densities", f"One-sided. {_SIGMA}"),
         "Waterfalls": captioned("waterfalls", "Grey: samples are missing."),
         "Waveforms": captioned("waveforms", "Long records are drawn by the extremes of each stretch."),
