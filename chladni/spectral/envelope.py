@@ -125,9 +125,12 @@ def envelope_spectra(
         for channel in lead[0].channels
         if channel.name in choices
     ]
+    rows = [row for row, channel in enumerate(lead[0].channels) if channel.name in choices]
     for block in blocks:
-        for one in accumulators:
-            one.update(block.select([one.channel.name]))
+        for row, one in zip(rows, accumulators, strict=True):
+            valid = None if block.valid is None else block.valid[row : row + 1]
+            alone = replace(block, values=block.values[row : row + 1], channels=(one.channel,), valid=valid)
+            one.update(alone)
     return tuple(one.result(faults_hz) for one in accumulators)
 
 

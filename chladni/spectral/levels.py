@@ -134,8 +134,10 @@ class LevelsAccumulator:
             for passed in filter_.feed(block):
                 self._add(windows, passed)
         if not self._filters:
-            for name in (channel.name for channel in block.channels):
-                alone = block.select([name])
+            # A channel counts its own samples, so that those of others don't excuse it.
+            measured = True if block.valid is None else block.valid
+            for row in np.flatnonzero((~np.isfinite(block.values) & measured).any(axis=1)):
+                alone = block.select([block.channels[row].name])
                 require_finite(alone, valid_runs(alone))
             self._add(self._windows[0], block)
 

@@ -279,11 +279,24 @@ def octave_density(source: Source, *, resolution_hz: float) -> PowerSpectralDens
 def octave_resolution_hz(
     sample_rate_hz: float, duration_s: float, *, fraction: int, low_hz: float | None = None
 ) -> float:
-    """Give the distance of lines for octave bands from `low_hz` on, or for bands as low as the record allows."""
+    """Give the distance of lines for octave bands from `low_hz` on, or for bands as low as the record allows.
+
+    Raises
+    ------
+    EstimateError
+        When the record is too short for any band.
+    """
     _require_fraction(fraction)
     if low_hz is not None:
         return min(low_hz * _relative_width(fraction) / LINES_OF_A_BAND, sample_rate_hz / 4)
-    return min(SEGMENTS / duration_s, sample_rate_hz / 4)
+    resolution_hz = SEGMENTS / duration_s
+    begins_hz = lowest_band_hz(resolution_hz, fraction=fraction)
+    if begins_hz * OCTAVE ** (1 / fraction) > sample_rate_hz / 2:
+        raise EstimateError(
+            f"a record of {duration_s:.3g} s shows {name_of(fraction)} bands from {begins_hz:.3g} Hz on, and its "
+            f"samples end at {sample_rate_hz / 2:g} Hz; measure longer, or ask for coarser bands"
+        )
+    return resolution_hz
 
 
 def lowest_band_hz(resolution_hz: float, *, fraction: int) -> float:

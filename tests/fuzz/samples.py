@@ -281,7 +281,8 @@ def read_case(path: Path, case: Case) -> str:
 def log_command(path: Path, rng: random.Random) -> list[str]:
     """Any command that takes a log or a data file."""
     rate = ["--rate", "100"] if path.suffix == ".npy" else []
-    name = rng.choice(("info", "psd", "modes", "compare", "convert"))
+    measured = ("levels", "psd", "octaves", "envelope", "cepstrum")
+    name = rng.choice((*measured, "info", "modes", "compare", "convert"))
     json_file = ["--json", str(path.with_name("out.json"))] if rng.random() < 0.5 else []
     more = {
         "modes": ["--operational"],

@@ -119,6 +119,11 @@ def test_a_series_has_lines_fine_enough_for_the_lowest_band_asked_for():
     assert octaves(sine(100.0)).bands.provenance.averages == 31
 
 
+def test_a_record_too_short_for_any_band_is_told():
+    with pytest.raises(EstimateError, match=r"a record of 0\.02 s shows 1/3 octave bands from 1\.54e\+04 Hz on"):
+        octaves(sine(500.0, seconds=0.02))
+
+
 def test_a_range_that_touches_the_edges_holds_the_band():
     band = octave_band(3)
     assert octave_bands(band.low_hz, band.high_hz) == (band,)
