@@ -10,7 +10,7 @@ from chladni.signals.arrays import Index, Mask, Real, Whole
 from chladni.signals.channel import Channel, Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.levels import Levels, RunningLevels
-from chladni.signals.number_range import require_in_range
+from chladni.signals.number_range import LARGEST, require_in_range
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.spectral.accumulator import require_finite
 from chladni.spectral.band_filter import BandFilter
@@ -136,7 +136,7 @@ class LevelsAccumulator:
         if not self._filters:
             # A channel counts its own samples, so that those of others don't excuse it.
             measured = True if block.valid is None else block.valid
-            for row in np.flatnonzero((~np.isfinite(block.values) & measured).any(axis=1)):
+            for row in np.flatnonzero((~(np.abs(block.values) <= LARGEST) & measured).any(axis=1)):
                 alone = block.select([block.channels[row].name])
                 require_finite(alone, valid_runs(alone))
             self._add(self._windows[0], block)
