@@ -136,7 +136,7 @@ class LevelsAccumulator:
         if not self._filters:
             # A channel counts its own samples, so that those of others don't excuse it.
             measured = True if block.valid is None else block.valid
-            for row in np.flatnonzero((~(np.abs(block.values) <= LARGEST) & measured).any(axis=1)):
+            for row in np.flatnonzero((~(np.abs(block.values) <= np.float64(LARGEST)) & measured).any(axis=1)):
                 alone = block.select([block.channels[row].name])
                 require_finite(alone, valid_runs(alone))
             self._add(self._windows[0], block)
