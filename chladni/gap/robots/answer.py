@@ -46,6 +46,8 @@ _GAP = 1.5
 _SIGMAS = 2.0
 #: Times the noise from which an error is clear of it.
 _CLEAR = 2.0
+#: Of the error without: what is left by an answer that takes the place of one that was denied.
+_HALF = 0.5
 #: Of its share where it acts most: joints with less don't tell of it.
 _ACTS = 0.1
 #: What a description states and a joint may have less of: then it's a value that is wrong.
@@ -81,6 +83,19 @@ class Answer:
     def denied(self) -> Confirmed | None:
         """What simulation says of the names that torques suggest, when it's better without them all."""
         return self._confirmed[1] if self._suggested and not self.named else None
+
+    @cached_property
+    def to_leave_out(self) -> frozenset[str]:
+        """What a simulation denies first, as ``word@site``: what else explains those torques may follow it."""
+        if self.denied is None:
+            return frozenset()
+        left = _without_worst(self._suggested, self.denied, self.solved.torques)
+        return frozenset(f"{one.term.word}@{one.term.site}" for one in self._suggested if one not in left)
+
+    def is_confirmed(self) -> bool:
+        """Whether simulation takes more than half of the error away."""
+        found = self._confirmed[1]
+        return bool(self.named) and found is not None and found.after < _HALF * found.tuned
 
     @property
     def _simulated(self) -> Confirmed | None:

@@ -110,7 +110,7 @@ def solved(torques: Torques, left_out: frozenset[str], progress: Callable[[float
     Parameters
     ----------
     left_out
-        Words that don't take part.
+        Words, and words at a site (``word@site``), that don't take part.
     """
     names = unknown_gains(torques)
     gains = guessed_gains(torques, names) if names else {}

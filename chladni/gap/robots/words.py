@@ -37,7 +37,13 @@ ROBOT_WORDS = tuple(
 
 
 def all_terms(torques: Torques, left_out: frozenset[str] = frozenset()) -> list[Term]:
-    """Give the words that take part at every site of a robot, and laws with the forms that were found."""
+    """Give the words that take part at every site of a robot, and laws with the forms that were found.
+
+    Parameters
+    ----------
+    left_out
+        Words, and words at a site as ``word@site``, that don't take part.
+    """
     key = f"terms without {sorted(left_out)}"
     if key not in torques.memory:
         torques.memory[key] = _made(_LASTING, torques, left_out)
@@ -48,7 +54,12 @@ def all_terms(torques: Torques, left_out: frozenset[str] = frozenset()) -> list[
 
 def _made(makers: Mapping[Maker, tuple[str, ...]], torques: Torques, left_out: frozenset[str]) -> list[Term]:
     takes_part = [make for make, words in makers.items() if not left_out.issuperset(words)]
-    return [term for make in takes_part for term in make(torques) if term.word not in left_out]
+    return [
+        term
+        for make in takes_part
+        for term in make(torques)
+        if left_out.isdisjoint((term.word, f"{term.word}@{term.site}"))
+    ]
 
 
 def _found(terms: list[Term], key: FormKey, value: float) -> Term | None:

@@ -205,3 +205,13 @@ def test_the_facade_takes_a_robot_and_its_bag(tmp_path: Path) -> None:
         chladni.diagnose_gap(robot.description, bag, join="hold")
     # A word that has no column yet is one all the same.
     assert named(chladni.diagnose_gap(robot.description, bag, leave_out=["backlash"])) == named(found)
+
+
+def test_a_word_may_be_left_out_at_one_site(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(3.0)
+    torques = torques_of(robot, joint_log_of(robot, run_native(robot, command), command=command))
+    sites = [
+        {term.site for term in all_terms(torques, left_out) if term.word == "armature"}
+        for left_out in (frozenset[str](), frozenset({"armature@elbow"}), frozenset({"armature"}))
+    ]
+    assert sites == [{"shoulder", "elbow"}, {"shoulder"}, set()]
