@@ -34,7 +34,7 @@ def delay(
     ] = None,
     band: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="LO HI", help="Frequencies to use, in Hz.", show_default=False),
+        typer.Option(metavar="LO-HI", help="Frequencies to use, in Hz.", show_default=False),
     ] = None,
     longest: Annotated[
         float | None,

@@ -28,7 +28,7 @@ def envelope(
     band: Annotated[
         tuple[float, float] | None,
         typer.Option(
-            metavar="LO HI",
+            metavar="LO-HI",
             help="Band of the envelope, in Hz; by kurtogram if not given.",
             show_default=False,
         ),

@@ -24,7 +24,7 @@ def levels(
     channel: options.Channels = None,
     band: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="LO HI", help="Levels between these frequencies, in Hz.", show_default=False),
+        typer.Option(metavar="LO-HI", help="Levels between these frequencies, in Hz.", show_default=False),
     ] = None,
     running: Annotated[
         float | None,

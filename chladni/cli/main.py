@@ -29,6 +29,7 @@ from chladni.cli.levels import levels
 from chladni.cli.modes import modes
 from chladni.cli.octaves import octaves
 from chladni.cli.ods import ods
+from chladni.cli.options import Command
 from chladni.cli.orders import orders
 from chladni.cli.psd import psd
 from chladni.cli.simulate import simulate
@@ -76,7 +77,7 @@ for command in (
     bench,
     demo,
 ):
-    app.command()(command)
+    app.command(cls=Command)(command)
 app.add_typer(blind)
 
 

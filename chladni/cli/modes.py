@@ -36,7 +36,7 @@ def modes(
     ] = None,
     band: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="LO HI", help="Only modes between these frequencies, in Hz.", show_default=False),
+        typer.Option(metavar="LO-HI", help="Only modes between these frequencies, in Hz.", show_default=False),
     ] = None,
     count: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="At most so many modes.", show_default=False)

@@ -1,9 +1,20 @@
 """Arguments and options that several commands share."""
 
+import re
+from collections import deque
+from collections.abc import Collection, Sequence
+from contextlib import suppress
+from itertools import islice
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
+from typer.core import TyperCommand
+
+from chladni.signals.text_reading import real_number
+
+_NUMBER = r"(\+?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_BAND = re.compile(rf"{_NUMBER}[-:]{_NUMBER}", re.ASCII)
 
 Log = Annotated[
     Path,
@@ -50,3 +61,54 @@ Figures = Annotated[
     Path | None,
     typer.Option(metavar="FOLDER", help="Save the figures as PNG and SVG.", show_default=False),
 ]
+
+
+class Command(TyperCommand):
+    """A command whose bands are one word or two: ``--band 5-50``, ``--band 5:50``, ``--band 5 50``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the command line, with bands of one word as two."""
+        # Of all options, bands alone are two values. A line that is being completed may break off in one.
+        bands = {name for one in self.params if one.nargs == 2 for name in one.opts}
+        return super().parse_args(ctx, args if ctx.resilient_parsing else with_parted_bands(args, bands))
+
+
+def with_parted_bands(words: Sequence[str], options: Collection[str]) -> list[str]:
+    """Give the words of a command line with the bands after `options` as two words each.
+
+    Raises
+    ------
+    BadParameter
+        When an option is followed by anything else than a band.
+
+    Examples
+    --------
+    >>> with_parted_bands(["a.mcap", "--band", "5-50", "--count", "3"], ["--band"])
+    ['a.mcap', '--band', '5', '50', '--count', '3']
+    >>> with_parted_bands(["--band=1e-1:2.5"], ["--band"]), with_parted_bands(["--band", "5", "50"], ["--band"])
+    (['--band', '1e-1', '2.5'], ['--band', '5', '50'])
+    """
+    left, parted = deque(words), list[str]()
+    while left and left[0] != "--":
+        name, equals, value = left[0].partition("=")
+        if name not in options:
+            parted.append(left.popleft())
+            continue
+        left.popleft()
+        if equals:
+            left.appendleft(value)
+        parted += (name, *_band(name, left))
+    return [*parted, *left]
+
+
+def _band(option: str, left: deque[str]) -> list[str]:
+    """Take the ends of a band off the words that are left."""
+    word = left.popleft() if left else ""
+    if together := _BAND.fullmatch(word):
+        return list(together.groups())
+    apart = [word, *islice(left, 1)]
+    with suppress(ValueError):
+        if len([*map(real_number, apart)]) == 2:
+            left.popleft()
+            return apart
+    raise typer.BadParameter(f"{option} {word!r} is no band; give its ends in Hz, such as {option} 5-50")

@@ -43,7 +43,7 @@ def orders(
     ridge_order: Annotated[float, typer.Option(metavar="ORDER", help="Which order the ridge is.")] = 1.0,
     ridge_band: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="LO HI", help="Where the ridge runs, in Hz.", show_default=False),
+        typer.Option(metavar="LO-HI", help="Where the ridge runs, in Hz.", show_default=False),
     ] = None,
     order: Annotated[
         list[float] | None,

@@ -47,7 +47,7 @@ Level = Annotated[
 ]
 Band = Annotated[
     tuple[float, float] | None,
-    typer.Option(metavar="LO HI", help="Excited frequencies in Hz, of random, sweep and multisine."),
+    typer.Option(metavar="LO-HI", help="Excited frequencies in Hz, of random, sweep and multisine."),
 ]
 Driving = Annotated[
     Path | None,

@@ -32,7 +32,7 @@ def srs(
     band: Annotated[
         tuple[float, float] | None,
         typer.Option(
-            metavar="LO HI",
+            metavar="LO-HI",
             help="Natural frequencies, in Hz; from one over the log's length to a tenth of the rate if not given.",
             show_default=False,
         ),

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def zoom(
     log: options.Log,
     *,
-    band: Annotated[tuple[float, float], typer.Option(metavar="LO HI", help="The band, in Hz.", show_default=False)],
+    band: Annotated[tuple[float, float], typer.Option(metavar="LO-HI", help="The band, in Hz.", show_default=False)],
     lines: Annotated[int, typer.Option(metavar="N", help="Lines in it.")] = 2000,
     quantity: Annotated[Literal["peak", "rms"], typer.Option(help="What of a tone is told.")] = "peak",
     channel: options.Channels = None,
