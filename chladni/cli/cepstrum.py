@@ -29,6 +29,7 @@ def cepstrum(
     end: options.End = None,
     opener: Opener,
     json: options.Json = None,
+    csv: options.Csv = None,
     figures: options.Figures = None,
     report: options.Report = None,
 ) -> None:
@@ -38,10 +39,11 @@ def cepstrum(
     from chladni.apps.sources import Span
     from chladni.signals.study import Study
 
+    reads = [log, opener.setup]
     require_places(
-        reads=[log, opener.setup], writes={"--json": json, "--report": report}, folders={"--figures": figures}
+        reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
     )
-    out = Output(json)
+    out = Output(json, csv)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = measure_cepstra(
             opened,
@@ -56,6 +58,7 @@ def cepstrum(
         _print_peaks(out, one)
     out.lines((*told, *found.notes))
     study = Study(title=log.name, cepstra=found.cepstra, findings=(*told, *found.notes))
+    out.csv(found.cepstra, reads=reads)
     out.pictures(study, figures=figures, report=report)
     out.json(cepstrum_document(found))
 

@@ -44,6 +44,7 @@ def frf(
     join: options.Join = "auto",
     opener: Opener,
     json: options.Json = None,
+    csv: options.Csv = None,
     figures: options.Figures = None,
     report: options.Report = None,
 ) -> None:
@@ -55,10 +56,11 @@ def frf(
     from chladni.signals.study import Study
     from chladni.spectral.peaks import find_response_peaks
 
+    reads = [log, opener.setup]
     require_places(
-        reads=[log, opener.setup], writes={"--json": json, "--report": report}, folders={"--figures": figures}
+        reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
     )
-    out = Output(json)
+    out = Output(json, csv)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = transfer(
             opened,
@@ -77,6 +79,7 @@ def frf(
     findings = told + found.provenance.notes
     out.lines(findings)
     study = Study(title=log.name, response=found, response_peaks=peaks, geometry=geometry, findings=findings)
+    out.csv([found], reads=reads)
     out.pictures(study, figures=figures, report=report)
     out.json(frf_document(found, peaks))
 

@@ -32,6 +32,7 @@ def octaves(
     end: options.End = None,
     opener: Opener,
     json: options.Json = None,
+    csv: options.Csv = None,
     figures: options.Figures = None,
     report: options.Report = None,
 ) -> None:
@@ -41,10 +42,11 @@ def octaves(
     from chladni.apps.sources import Span
     from chladni.signals.study import Study
 
+    reads = [log, opener.setup]
     require_places(
-        reads=[log, opener.setup], writes={"--json": json, "--report": report}, folders={"--figures": figures}
+        reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
     )
-    out = Output(json)
+    out = Output(json, csv)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = measure_octaves(
             opened,
@@ -60,6 +62,7 @@ def octaves(
         _print_bands(out, one)
     out.lines((*told, *found.notes))
     study = Study(title=log.name, octaves=found.octaves, findings=(*told, *found.notes))
+    out.csv(found.octaves, reads=reads)
     out.pictures(study, figures=figures, report=report)
     out.json(octaves_document(found))
 

@@ -30,6 +30,12 @@ Json = Annotated[
         "--json", metavar="FILE", help="Write the result as JSON; - for standard output.", show_default=False
     ),
 ]
+Csv = Annotated[
+    str | None,
+    typer.Option(
+        "--csv", metavar="FILE", help="Write the values as a table; - for standard output.", show_default=False
+    ),
+]
 Channels = Annotated[
     list[str] | None,
     typer.Option("--channel", metavar="PATH", help="Only this channel; may be repeated.", show_default=False),

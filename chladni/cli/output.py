@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rich import box
@@ -14,13 +15,15 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from chladni.cli.places import require_places
 from chladni.io.atomic import Place, atomic_write
-from chladni.signals.errors import LogError
+from chladni.signals.errors import LogError, SetupError
 from chladni.signals.visible import visible, visible_json, visible_lines
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from chladni.signals.study import Study
+    from chladni.signals.value import Value
 
 PROGRESS_AFTER_S = 1.0
 STANDARD_OUTPUT = 1
@@ -62,15 +65,14 @@ def writing(stream: str) -> Iterator[None]:
 
 
 class Output:
-    """Tables go to standard output, unless JSON was asked for there: then to standard error."""
+    """Tables go to standard output, unless JSON or CSV was asked for there: then to standard error."""
 
-    def __init__(self, json_target: str | None = None) -> None:
-        if json_target is not None and Place.of(json_target).descriptor == STANDARD_OUTPUT:
-            json_target = "-"
-        if json_target == "-" and sys.stdout is None:
-            raise LogError("standard output is closed: it can't take the document of --json -; name a file")
-        self.json_target = json_target
-        self.console = _Console(stderr=json_target == "-", highlight=False, soft_wrap=False)
+    def __init__(self, json_target: str | None = None, csv_target: str | None = None) -> None:
+        self.json_target = _told_target(json_target, "the document of --json")
+        self.csv_target = _told_target(csv_target, "the table of --csv")
+        if self.json_target == self.csv_target == "-":
+            raise SetupError("--json and --csv would mix on standard output; name a file for one of them")
+        self.console = _Console(stderr="-" in (self.json_target, self.csv_target), highlight=False, soft_wrap=False)
         if not self.console.is_terminal:
             # A pipe has no width of its own; rich's 80 would cut channel names in two.
             self.console.width = max(self.console.width, 160)
@@ -131,10 +133,39 @@ class Output:
             with atomic_write(self.json_target) as file:
                 file.write(encoded)
             return
-        with writing("standard output"):
-            sys.stdout.flush()
-            sys.stdout.buffer.write(encoded)
-            sys.stdout.flush()
+        _send(encoded)
+
+    def csv(self, values: "Sequence[Value]", *, reads: Sequence[Path | None]) -> None:
+        """Write `values` where ``--csv`` said, and say so; nothing when it wasn't given.
+
+        A table has one axis. The second one goes beside the first, as ``psd_2.csv``, and so on.
+
+        Parameters
+        ----------
+        values
+            What makes tables.
+        reads
+            Files that the command reads, which aren't replaced.
+        """
+        if self.csv_target is None:
+            return
+        target = Path(self.csv_target)
+        if len(values) > 1 and (self.csv_target == "-" or Place.of(target).is_stream):
+            raise SetupError(
+                f"--csv {target}: a stream takes one table, and there are {len(values)} of different axes; "
+                "name a file, or a single channel (--channel)"
+            )
+        if self.csv_target == "-":
+            with TemporaryDirectory() as folder:
+                values[0].to_csv(Path(folder) / "table.csv")
+                _send((Path(folder) / "table.csv").read_bytes())
+            return
+        paths = [target, *(target.with_stem(f"{target.stem}_{place}") for place in range(2, len(values) + 1))]
+        beside = {f"table {place} of --csv": path for place, path in enumerate(paths, start=1)}
+        require_places(reads=reads, writes={"--json": self.json_target, **beside})
+        for value, path in zip(values, paths, strict=True):
+            value.to_csv(path)
+            self.line(f"table: {path}")
 
     @contextmanager
     def progress(self, title: str) -> Iterator[Progress]:
@@ -164,3 +195,19 @@ class Output:
             # Some versions of rich print an empty line when a bar that never started is stopped.
             if bar.live.is_started:
                 bar.stop()
+
+
+def _told_target(target: str | None, what: str) -> str | None:
+    """Give where a document goes, ``-`` for every name of standard output."""
+    if target is not None and Place.of(target).descriptor == STANDARD_OUTPUT:
+        target = "-"
+    if target == "-" and sys.stdout is None:
+        raise LogError(f"standard output is closed: it can't take {what} -; name a file")
+    return target
+
+
+def _send(content: bytes) -> None:
+    with writing("standard output"):
+        sys.stdout.flush()
+        sys.stdout.buffer.write(content)
+        sys.stdout.flush()

@@ -26,6 +26,7 @@ def psd(
     end: options.End = None,
     opener: Opener,
     json: options.Json = None,
+    csv: options.Csv = None,
     figures: options.Figures = None,
     report: options.Report = None,
 ) -> None:
@@ -37,10 +38,11 @@ def psd(
     from chladni.apps.unit_peaks import unit_peaks
     from chladni.signals.study import Study
 
+    reads = [log, opener.setup]
     require_places(
-        reads=[log, opener.setup], writes={"--json": json, "--report": report}, folders={"--figures": figures}
+        reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
     )
-    out = Output(json)
+    out = Output(json, csv)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = densities(
             opened,
@@ -61,6 +63,7 @@ def psd(
     out.lines((*told, *notes))
     peaks = tuple(peak for group in named for peak in group.peaks)
     study = Study(title=log.name, densities=found, peaks=peaks, geometry=geometry, findings=told + notes)
+    out.csv(found, reads=reads)
     out.pictures(study, figures=figures, report=report)
     out.json(document)
 

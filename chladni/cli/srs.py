@@ -46,6 +46,7 @@ def srs(
     end: options.End = None,
     opener: Opener,
     json: options.Json = None,
+    csv: options.Csv = None,
     figures: options.Figures = None,
 ) -> None:
     """Shock response spectra: the largest response of oscillators of every frequency."""
@@ -54,8 +55,9 @@ def srs(
     from chladni.apps.shock import shock_responses
     from chladni.apps.sources import Span
 
-    require_places(reads=[log, opener.setup], writes={"--json": json}, folders={"--figures": figures})
-    out = Output(json)
+    reads = [log, opener.setup]
+    require_places(reads=reads, writes={"--json": json, "--csv": csv}, folders={"--figures": figures})
+    out = Output(json, csv)
     with opener(log) as opened:
         found = shock_responses(
             opened,
@@ -71,6 +73,7 @@ def srs(
     for one in found:
         _print_highest(out, one)
     out.lines((*told, *(note for one in found for note in one.notes)))
+    out.csv(found, reads=reads)
     if figures is not None:
         _save_figures(out, found, figures)
     out.json(shock_document(found))

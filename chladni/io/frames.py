@@ -16,6 +16,7 @@ from chladni.io.files.csv import write_csv
 from chladni.signals.errors import SetupError
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.value import Value
+from chladni.signals.visible import cell_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,8 +78,9 @@ def to_csv(value: Value, path: Path | str) -> None:
     with atomic_write(path) as file:
         text = io.TextIOWrapper(file, encoding="utf-8", newline="")
         writer = csv.writer(text)
-        writer.writerow(titles)
-        writer.writerows(zip(rows, *(map(_cell, one.numbers.tolist()) for one in columns), strict=True))
+        # Names come from files that others wrote.
+        writer.writerow(map(cell_text, titles))
+        writer.writerows(zip(map(_cell, rows), *(map(_cell, one.numbers.tolist()) for one in columns), strict=True))
         text.flush()
         text.detach()
 
@@ -123,4 +125,6 @@ def _real(column: _Column) -> Iterator[_Column]:
 
 def _cell(number: Any) -> Any:
     """Leave a cell empty where nothing is known."""
+    if isinstance(number, str):
+        return cell_text(number)
     return "" if isinstance(number, float) and not np.isfinite(number) else number

@@ -100,9 +100,9 @@ def commands(path: Path, folder: Path) -> Iterator[tuple[object, ...]]:
     names = channels_of(path)
     force, motion = numbered(names, "force"), numbered(names, "motion")
     yield "info", path
-    yield "psd", path
+    yield "psd", path, "--csv", folder / "psd.csv"
     yield "levels", path, "--csv", folder / "l.csv", "--figures", folder
-    yield "octaves", path, "--figures", folder
+    yield "octaves", path, "--csv", folder / "octaves.csv", "--figures", folder
     yield "cepstrum", path, "--figures", folder
     yield "envelope", path, "--band", 20, 40, "--figures", folder
     yield "orders", path, "--ridge", motion, "--order", 1, "--figures", folder

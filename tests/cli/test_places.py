@@ -70,6 +70,11 @@ def test_standard_output_and_what_was_not_given_are_no_files(
     [
         ["info", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["levels", "{log}", "--setup", "{other}", "--csv", "{other}"],
+        ["psd", "{log}", "--setup", "{other}", "--csv", "{other}"],
+        ["frf", "{log}", "--setup", "{other}", "--csv", "{other}"],
+        ["octaves", "{log}", "--setup", "{other}", "--csv", "{other}"],
+        ["cepstrum", "{log}", "--setup", "{other}", "--csv", "{other}"],
+        ["srs", "{log}", "--setup", "{other}", "--csv", "{other}"],
         ["cepstrum", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["envelope", "{log}", "--setup", "{other}", "--json", "{other}"],
         ["octaves", "{log}", "--setup", "{other}", "--json", "{other}"],
