@@ -39,6 +39,7 @@ def frf(
     resolution: options.Resolution = None,
     window: options.Window = None,
     overlap: options.Overlap = None,
+    fmax: options.Fmax = None,
     start: options.Start = None,
     end: options.End = None,
     join: options.Join = "auto",
@@ -54,6 +55,7 @@ def frf(
     from chladni.apps.sources import Span
     from chladni.apps.spectra import Averaging, transfer
     from chladni.signals.study import Study
+    from chladni.spectral.bands import up_to
     from chladni.spectral.peaks import find_response_peaks
 
     reads = [log, opener.setup]
@@ -73,6 +75,7 @@ def frf(
         )
         told = reading_sentences(opened, everything=response is None)
         geometry = opened.geometry
+    found = up_to(found, fmax)
     peaks = find_response_peaks(found)
     _print_account(out, found)
     _print_peaks(out, found, peaks)

@@ -51,6 +51,10 @@ Window = Annotated[
 Overlap = Annotated[
     float | None, typer.Option(metavar="SHARE", help="Overlap of segments, 0 to 1; 0.5 if not given.")
 ]
+Fmax = Annotated[
+    float | None,
+    typer.Option("--fmax", metavar="HZ", help="Leave out all that is above, levels included.", show_default=False),
+]
 Start = Annotated[float | None, typer.Option(metavar="S", help="Seconds from the log's start.", show_default=False)]
 End = Annotated[float | None, typer.Option(metavar="S", help="Seconds from the log's start.", show_default=False)]
 Join = Annotated[

@@ -22,6 +22,7 @@ def psd(
     resolution: options.Resolution = None,
     window: options.Window = None,
     overlap: options.Overlap = None,
+    fmax: options.Fmax = None,
     start: options.Start = None,
     end: options.End = None,
     opener: Opener,
@@ -37,6 +38,7 @@ def psd(
     from chladni.apps.spectra import Averaging, densities
     from chladni.apps.unit_peaks import unit_peaks
     from chladni.signals.study import Study
+    from chladni.spectral.bands import up_to
 
     reads = [log, opener.setup]
     require_places(
@@ -53,6 +55,7 @@ def psd(
         )
         told = reading_sentences(opened, everything=channel is None)
         geometry = opened.geometry
+    found = tuple(up_to(one, fmax) for one in found)
     document = psd_document(found)
     named = [group for density in found for group in unit_peaks(density)]
     for density in found:

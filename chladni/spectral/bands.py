@@ -1,14 +1,19 @@
-"""RMS levels in frequency bands, from power spectral densities."""
+"""Parts of spectra: RMS levels in frequency bands, and what lies below a frequency."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
+from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.levels import BandLevels
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.spectral.leakage import line_correlation, named_window
+
+EstimateT = TypeVar("EstimateT", PowerSpectralDensity, FrequencyResponse)
 
 
 def band_rms(density: PowerSpectralDensity, *, bands_hz: Sequence[tuple[float, float]]) -> BandLevels:
@@ -120,3 +125,31 @@ def _uncovered_note(bands: Real, cells: Real) -> tuple[str, ...]:
     named = ", ".join(f"{low:g}-{high:g} Hz" for low, high in bands[:3])
     more = f" and {len(bands) - 3} more" if len(bands) > 3 else ""
     return (f"no level for {named}{more}: the spectrum covers {cells[0]:g} to {cells[-1]:g} Hz",)
+
+
+def up_to(estimate: EstimateT, highest_hz: float | None) -> EstimateT:
+    """Give the lines of an estimate up to a frequency, and a note that the others are left out; None leaves it whole.
+
+    Raises
+    ------
+    EstimateError
+        When that leaves fewer than two lines.
+    """
+    line_hz = estimate.frequency_hz
+    if highest_hz is None:
+        return estimate
+    kept = line_hz <= highest_hz
+    if np.count_nonzero(kept) < 2:
+        raise EstimateError(
+            f"--fmax {highest_hz:g} Hz leaves fewer than two lines: they begin at {line_hz[0]:.6g} Hz and are "
+            f"{np.diff(line_hz).min(initial=np.inf):.6g} Hz apart; ask for more"
+        )
+    if kept.all():
+        return estimate
+    cut: dict[str, Any] = {
+        name: np.compress(kept, getattr(estimate, name), axis=axes.index("frequency_hz"))
+        for name, axes in estimate.AXES.items()
+    }
+    note = f"lines above {highest_hz:g} Hz are left out, of levels and peaks as well"
+    account = estimate.provenance.with_notes(note)
+    return replace(estimate, frequency_hz=line_hz[kept], provenance=account, **cut)
