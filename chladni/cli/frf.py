@@ -7,7 +7,7 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
+from chladni.cli.places import require_drawn, require_places
 from chladni.cli.words import number, unit, with_error
 from chladni.signals.wording import counted
 
@@ -48,6 +48,8 @@ def frf(
     csv: options.Csv = None,
     figures: options.Figures = None,
     report: options.Report = None,
+    db: options.Decibels = False,
+    log_frequency: options.LogFrequency = False,
 ) -> None:
     """Transfer functions and coherence, with their uncertainty."""
     from chladni.apps.documents import frf_document
@@ -62,6 +64,7 @@ def frf(
     require_places(
         reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
     )
+    require_drawn({"--db": db, "--log-frequency": log_frequency}, [figures, report])
     out = Output(json, csv)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = transfer(
@@ -83,7 +86,7 @@ def frf(
     out.lines(findings)
     study = Study(title=log.name, response=found, response_peaks=peaks, geometry=geometry, findings=findings)
     out.csv([found], reads=reads)
-    out.pictures(study, figures=figures, report=report)
+    out.pictures(study, figures=figures, report=report, decibels=db, log_frequency=log_frequency)
     out.json(frf_document(found, peaks))
 
 

@@ -67,6 +67,10 @@ Report = Annotated[
     Path | None,
     typer.Option(metavar="FILE.html", help="Write a self-contained HTML report.", show_default=False),
 ]
+Decibels = Annotated[bool, typer.Option("--db", help="Number levels in decibels, in figures and report.")]
+LogFrequency = Annotated[
+    bool, typer.Option("--log-frequency", help="Divide frequency logarithmically, in figures and report.")
+]
 Figures = Annotated[
     Path | None,
     typer.Option(metavar="FOLDER", help="Save the figures as PNG and SVG.", show_default=False),

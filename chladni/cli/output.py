@@ -106,13 +106,22 @@ class Output:
         if len(rows) > MOST_ROWS:
             self.line(f"... and {counted(len(rows) - MOST_ROWS, 'more row')}; --json FILE holds all of them")
 
-    def pictures(self, study: "Study", *, figures: Path | None, report: Path | None) -> None:
+    def pictures(
+        self,
+        study: "Study",
+        *,
+        figures: Path | None,
+        report: Path | None,
+        decibels: bool = False,
+        log_frequency: bool = False,
+    ) -> None:
         """Save figures and report where they were asked for, and say where they are."""
         if figures is None and report is None:
             return
         from chladni.viewers.figures import Album, save_album
+        from chladni.viewers.figures.log_axis import Scales
 
-        album = Album.of(study)
+        album = Album.of(study, scales=Scales(decibels=decibels, log_frequency=log_frequency))
         if figures is not None:
             for path in save_album(album, figures):
                 self.line(f"figure: {path}")

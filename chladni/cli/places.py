@@ -59,6 +59,15 @@ def require_places(
     _require_apart(places, [place for path in reads if path is not None for place in _read_place(path)])
 
 
+def require_drawn(given: Mapping[str, bool], pictures: Iterable[Path | None]) -> None:
+    """Raise `SetupError` when options say how pictures look, and none was asked for."""
+    if not any(pictures):
+        for option in (name for name, is_given in given.items() if is_given):
+            raise SetupError(
+                f"{option} says how pictures look; ask for some (--figures FOLDER or --report FILE.html)"
+            )
+
+
 def _require_suffix(option: str, path: Path) -> None:
     known = SUFFIXES.get(option, ())
     if known and path.suffix.lower() not in known:

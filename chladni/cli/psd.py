@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
+from chladni.cli.places import require_drawn, require_places
 from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ def psd(
     csv: options.Csv = None,
     figures: options.Figures = None,
     report: options.Report = None,
+    db: options.Decibels = False,
+    log_frequency: options.LogFrequency = False,
 ) -> None:
     """Averaged power spectral densities with named peaks."""
     from chladni.apps.documents import psd_document
@@ -44,6 +46,7 @@ def psd(
     require_places(
         reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
     )
+    require_drawn({"--db": db, "--log-frequency": log_frequency}, [figures, report])
     out = Output(json, csv)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = densities(
@@ -67,7 +70,7 @@ def psd(
     peaks = tuple(peak for group in named for peak in group.peaks)
     study = Study(title=log.name, densities=found, peaks=peaks, geometry=geometry, findings=told + notes)
     out.csv(found, reads=reads)
-    out.pictures(study, figures=figures, report=report)
+    out.pictures(study, figures=figures, report=report, decibels=db, log_frequency=log_frequency)
     out.json(document)
 
 

@@ -27,7 +27,7 @@ from chladni.viewers.figures import (
     waterfall_figures,
     waveform_figures,
 )
-from chladni.viewers.figures.log_axis import power_of_ten
+from chladni.viewers.figures.log_axis import Scales, power_of_ten
 from chladni.viewers.figures.peak_labels import LABELS, label_peaks
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.sheet import plain
@@ -243,10 +243,31 @@ def test_names_of_crowded_peaks_do_not_overlap() -> None:
 
 
 def test_log_frequency_leaves_out_zero() -> None:
-    figure = density_figures(synthetic.study(), frequency_scale="log")[PSD]
+    figure = density_figures(synthetic.study(), scales=Scales(log_frequency=True))[PSD]
     (axes,) = figure.axes
     assert axes.get_xscale() == "log"
     assert np.asarray(axes.lines[0].get_xdata(), dtype=np.float64).min() > 0
+
+
+def test_decibels_number_the_same_curves() -> None:
+    for draw, name, decade_db in ((density_figures, PSD, 10), (response_figures, RESPONSE, 20)):
+        usual, told = (draw(synthetic.study(), scales=one)[name].axes[0] for one in (Scales(), Scales(decibels=True)))
+        np.testing.assert_array_equal(told.lines[0].get_ydata(), usual.lines[0].get_ydata())
+        assert told.get_ylim() == usual.get_ylim()
+        assert told.get_ylabel().split("[")[1].startswith("dB over 1 ")
+        low, high = told.get_ylim()
+        places = [place for place in told.get_yticks() if low <= place <= high]
+        numbers = [float(told.yaxis.get_major_formatter()(place)) for place in places]
+        assert len(numbers) > 2
+        assert all(number % 5 == 0 for number in numbers)
+        np.testing.assert_allclose(numbers, decade_db * np.log10(places), atol=1e-9)
+
+
+def test_a_response_over_log_frequency_begins_above_zero() -> None:
+    axes = response_figures(synthetic.study(), scales=Scales(log_frequency=True))[RESPONSE].axes
+    for one in axes:
+        assert one.get_xscale() == "log"
+        assert one.get_xlim()[0] > 0
 
 
 def test_several_references_make_a_figure_each_and_name_only_the_peaks_that_say_which() -> None:

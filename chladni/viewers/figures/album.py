@@ -12,6 +12,7 @@ from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.envelope import envelope_figures
 from chladni.viewers.figures.frequency_response import response_figures
 from chladni.viewers.figures.levels import level_figures
+from chladni.viewers.figures.log_axis import USUAL, Scales
 from chladni.viewers.figures.mac import mac_figures
 from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
@@ -38,8 +39,11 @@ class Album:
         self._rendered: dict[tuple[str, str], bytes] = {}
 
     @classmethod
-    def of(cls, study: Study) -> Self:
-        """Draw every figure that the study has data for: waveforms, spectra, transfer functions, modes."""
+    def of(cls, study: Study, *, scales: Scales = USUAL) -> Self:
+        """Draw every figure that the study has data for: waveforms, spectra, transfer functions, modes.
+
+        `scales` divides the axes of spectra and transfer functions.
+        """
         return cls(
             {
                 "waveforms": waveform_figures(study),
@@ -47,8 +51,8 @@ class Album:
                 "octaves": octave_figures(study),
                 "envelopes": envelope_figures(study),
                 "cepstra": cepstrum_figures(study),
-                "densities": density_figures(study),
-                "responses": response_figures(study),
+                "densities": density_figures(study, scales=scales),
+                "responses": response_figures(study, scales=scales),
                 "nyquist": nyquist_figures(study),
                 "waterfalls": waterfall_figures(study),
                 "mode shapes": mode_shape_figures(study),

@@ -1,7 +1,6 @@
 """Power spectral densities with their one-sigma bands and named peaks."""
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +10,7 @@ from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.study import Study
 from chladni.viewers.drawing import decibels_of_power, level_limits
-from chladni.viewers.figures.log_axis import logarithmic
+from chladni.viewers.figures.log_axis import USUAL, Scales
 from chladni.viewers.figures.peak_labels import STRIP_POINTS, label_peaks
 from chladni.viewers.figures.sheet import BAND_OPACITY, BANDS_OF, legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
@@ -21,33 +20,31 @@ from chladni.viewers.style import Style
 HEIGHT_IN = 2.9
 
 
-def density_figures(study: Study, *, frequency_scale: Literal["linear", "log"] = "linear") -> dict[str, Figure]:
+def density_figures(study: Study, *, scales: Scales = USUAL) -> dict[str, Figure]:
     """Draw the densities on a logarithmic scale; one figure for each group of channels of one unit, by name.
 
     Parameters
     ----------
     study
         What to draw.
-    frequency_scale
-        Scale of the frequency axis.
+    scales
+        How the axes are divided.
     """
     style = Style.of(study)
     with look():
         return {
-            f"psd {place} {group.name}": _figure(study, density, group, style, frequency_scale)
+            f"psd {place} {group.name}": _figure(study, density, group, style, scales)
             for place, density in enumerate(study.densities, start=1)
             for group in groups(density.channels)
         }
 
 
-def _figure(
-    study: Study, density: PowerSpectralDensity, group: Group, style: Style, frequency_scale: Literal["linear", "log"]
-) -> Figure:
+def _figure(study: Study, density: PowerSpectralDensity, group: Group, style: Style, scales: Scales) -> Figure:
     unit = density.units[group.rows[0]]
     names = {density.channels[row].name for row in group.rows}
     peaks = [peak for peak in study.peaks if peak.unit == unit and set(peak.channels[:1]) <= names]
     figure, (axes,) = sheet([HEIGHT_IN], above_points=STRIP_POINTS if peaks else 0.0)
-    draw_densities(axes, density, group, style, peaks=peaks, frequency_scale=frequency_scale)
+    draw_densities(axes, density, group, style, peaks=peaks, scales=scales)
     axes.set_xlabel("Frequency [Hz]")
     return figure
 
@@ -59,19 +56,18 @@ def draw_densities(
     style: Style,
     *,
     peaks: Sequence[Peak] = (),
-    frequency_scale: Literal["linear", "log"] = "linear",
+    scales: Scales = USUAL,
 ) -> None:
     """Draw the densities of a group with their error bands, and the names of `peaks`."""
-    axes.set_xscale(frequency_scale)
     # A logarithmic axis has no place for zero frequency.
-    shown = density.frequency_hz > (0.0 if frequency_scale == "log" else -1.0)
+    shown = density.frequency_hz > (0.0 if scales.log_frequency else -1.0)
     low, high = level_limits(decibels_of_power(density.values[list(group.rows)][:, shown]))
-    logarithmic(axes, 10 ** (low / 10), 10 ** (high / 10))
+    scales.divide_levels(axes, low, high, decade_db=10)
     for row in group.rows:
         _draw(axes, density, row, shown, style, banded=len(group.rows) <= BANDS_OF)
-    axes.set_xlim(density.frequency_hz[shown][0], density.frequency_hz[-1])
+    scales.divide_frequency(axes, density.frequency_hz[shown])
     named = label_peaks(axes, peaks)
-    axes.set_ylabel(f"Power spectral density [{printed_unit(density.units[group.rows[0]])}]")
+    axes.set_ylabel(f"Power spectral density [{scales.unit(printed_unit(density.units[group.rows[0]]))}]")
     legend(axes, above_points=named)
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from chladni.signals.peak import Peak
 from chladni.signals.study import Study
 from chladni.viewers.drawing import decibels_of_amplitude, level_limits, line_breaks, phase_wraps, with_breaks
-from chladni.viewers.figures.log_axis import logarithmic
+from chladni.viewers.figures.log_axis import USUAL, Scales
 from chladni.viewers.figures.peak_labels import STRIP_POINTS, label_peaks
 from chladni.viewers.figures.sheet import BAND_OPACITY, BANDS_OF, legend, look, paint, plain, sheet
 from chladni.viewers.panels import Panel, panels
@@ -21,17 +21,17 @@ HEIGHTS_IN = (2.5, 1.35, 1.1)
 MARK_DB = 2.0
 
 
-def response_figures(study: Study) -> dict[str, Figure]:
+def response_figures(study: Study, *, scales: Scales = USUAL) -> dict[str, Figure]:
     """Draw the frequency responses on their excited lines; one figure for each group and reference, by name.
 
-    The magnitude carries its one-sigma band, the phase its convention.
+    The magnitude carries its one-sigma band, the phase its convention; `scales` says how the axes are divided.
     """
     if study.response is None:
         return {}
     style = Style.of(study)
     with look():
         return {
-            f"response {panel.reference + 1} {panel.group.name}": _figure(study, panel, style)
+            f"response {panel.reference + 1} {panel.group.name}": _figure(study, panel, style, scales)
             for panel in panels(study.response)
         }
 
@@ -41,12 +41,12 @@ def is_coherent(panel: Panel) -> bool:
     return any(np.isfinite(panel.coherence(row)).any() for row in panel.group.rows)
 
 
-def _figure(study: Study, panel: Panel, style: Style) -> Figure:
+def _figure(study: Study, panel: Panel, style: Style, scales: Scales) -> Figure:
     peaks = _peaks(study, panel)
     figure, (magnitude, phase, *below) = sheet(
         HEIGHTS_IN if is_coherent(panel) else HEIGHTS_IN[:2], above_points=STRIP_POINTS if peaks else 0.0, sharex=True
     )
-    draw_magnitude(magnitude, panel, style, peaks)
+    draw_magnitude(magnitude, panel, style, peaks, scales=scales)
     draw_phase(phase, panel, style)
     for axes in below:
         draw_coherence(axes, panel, style)
@@ -76,15 +76,17 @@ def draw_coherence(axes: Axes, panel: Panel, style: Style) -> None:
     axes.set_ylim(0, 1.04)
 
 
-def draw_magnitude(axes: Axes, panel: Panel, style: Style, peaks: Sequence[Peak] = ()) -> None:
+def draw_magnitude(
+    axes: Axes, panel: Panel, style: Style, peaks: Sequence[Peak] = (), *, scales: Scales = USUAL
+) -> None:
     """Draw the magnitude with its error bands, and the names of `peaks`."""
     magnitudes = np.array([np.abs(panel.function(row)) for row in panel.group.rows])
     low, high = level_limits(decibels_of_amplitude(magnitudes))
     # A resonance narrower than a line rises above every line.
     high = max([high, *(20 * np.log10(peak.height) + MARK_DB for peak in peaks)])
-    logarithmic(axes, 10 ** (low / 20), 10 ** (high / 20))
+    scales.divide_levels(axes, low, high, decade_db=20)
     frequency_hz = panel.frequency_hz()
-    axes.set_xlim(frequency_hz[0], frequency_hz[-1])
+    scales.divide_frequency(axes, frequency_hz)
     breaks = line_breaks(frequency_hz)
     for row, value in zip(panel.group.rows, magnitudes, strict=True):
         channel, std = panel.response.responses[row], panel.deviation(row)
@@ -96,7 +98,9 @@ def draw_magnitude(axes: Axes, panel: Panel, style: Style, peaks: Sequence[Peak]
         if len(panel.group.rows) <= BANDS_OF:
             axes.fill_between(x, curves[:, 1], curves[:, 2], color=colour, alpha=BAND_OPACITY, linewidth=0)
     reference = plain(style.labels[panel.response.references[panel.reference].name])
-    axes.set_ylabel(f"{panel.quantity} |H| [{panel.unit}]\n{panel.response.provenance.estimator}, to {reference}")
+    axes.set_ylabel(
+        f"{panel.quantity} |H| [{scales.unit(panel.unit)}]\n{panel.response.provenance.estimator}, to {reference}"
+    )
     named = label_peaks(axes, peaks)
     legend(axes, above_points=named)
 

@@ -1,13 +1,62 @@
 """Logarithmic axes whose numbers are plain text, which is set many times faster than mathematics."""
 
+from dataclasses import dataclass
 from math import log10
 
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from chladni.signals.arrays import Real
+
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 # Over fewer decades than this, powers of ten alone are too few numbers.
 FEW_DECADES = 2.0
+# Over fewer decibels, steps of ten are too few numbers.
+FEW_DECIBELS = 40.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scales:
+    """How the axes of spectra are divided.
+
+    Attributes
+    ----------
+    decibels
+        Whether levels are numbered in decibels over 1 of their unit.
+    log_frequency
+        Whether frequency has a logarithmic scale.
+    """
+
+    decibels: bool = False
+    log_frequency: bool = False
+
+    def unit(self, printed: str) -> str:
+        """Give what a level is numbered in, where `printed` is the unit of its values."""
+        if not self.decibels:
+            return printed
+        # Of pure numbers, and of their densities (1/Hz), the unit is the 1.
+        return f"dB over {printed}" if printed.startswith("1") else f"dB over 1 {printed}"
+
+    def divide_frequency(self, axes: Axes, frequency_hz: Real) -> None:
+        """Give the x axis its scale and limits; a logarithmic one begins at the first line above 0 Hz."""
+        if self.log_frequency and frequency_hz[-1] > 0:
+            logarithmic_frequency(axes, frequency_hz[frequency_hz > 0][0], frequency_hz[-1])
+        else:
+            axes.set_xlim(frequency_hz[0], frequency_hz[-1])
+
+    def divide_levels(self, axes: Axes, low_db: float, high_db: float, *, decade_db: float) -> None:
+        """Give the y axis its scale and limits; `decade_db` is 10 for powers and 20 for amplitudes."""
+        logarithmic(axes, 10 ** (low_db / decade_db), 10 ** (high_db / decade_db))
+        if not self.decibels:
+            return
+        step_db = 10.0 if high_db - low_db >= FEW_DECIBELS else 5.0
+        axes.yaxis.set_major_locator(LogLocator(base=10 ** (step_db / decade_db), numticks=12))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{decade_db * log10(value):.0f}"))
+        axes.yaxis.set_minor_locator(NullLocator())
+
+
+#: Powers of ten over hertz.
+USUAL = Scales()
 
 
 def power_of_ten(value: float) -> str:

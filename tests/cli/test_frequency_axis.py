@@ -1,4 +1,4 @@
-"""What lies above --fmax is left out of tables, documents and figures."""
+"""Where the frequency axis ends, and how spectra are divided in pictures: --fmax, --log-frequency, --db."""
 
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,11 @@ from scipy.signal import lfilter
 
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
+from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
+from chladni.viewers import figures
+from chladni.viewers.figures import Album, density_figures, response_figures
+from chladni.viewers.figures.log_axis import Scales
 from tests.cli.conftest import Run
 
 RATE_HZ = 500.0
@@ -76,3 +80,39 @@ def test_what_leaves_nothing_is_told_in_one_line(run: Run, log: Path, command: s
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert "--fmax " in outcome.err
     assert "apart; ask for more" in outcome.err
+
+
+@pytest.mark.parametrize("command", ["psd", "frf"])
+@pytest.mark.parametrize(
+    ("options", "scales"),
+    [((), Scales()), (("--db",), Scales(decibels=True)), (("--log-frequency",), Scales(log_frequency=True))],
+)
+def test_pictures_are_divided_as_asked_for(
+    run: Run,
+    log: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    command: str,
+    options: tuple[str, ...],
+    scales: Scales,
+) -> None:
+    asked = []
+
+    def draw(study: Study, *, scales: Scales) -> Album:
+        asked.append(scales)
+        return Album({"one": response_figures(study, scales=scales) | density_figures(study, scales=scales)})
+
+    monkeypatch.setattr(Album, "of", draw)
+    monkeypatch.setattr(figures, "save_album", lambda album, folder: [folder / one for one in album.figures])
+    outcome = run(command, log, *options, "--figures", tmp_path)
+    assert outcome.code == 0, outcome.err
+    assert "figure: " in outcome.out
+    assert asked == [scales]
+
+
+@pytest.mark.parametrize("command", ["psd", "frf"])
+@pytest.mark.parametrize("option", ["--db", "--log-frequency"])
+def test_how_pictures_look_is_refused_without_any(run: Run, log: Path, command: str, option: str) -> None:
+    refused = run(command, log, option)
+    assert (refused.code, refused.out, refused.err.count("\n")) == (2, "", 1)
+    assert f"{option} says how pictures look; ask for some (--figures FOLDER or --report FILE.html)" in refused.err
