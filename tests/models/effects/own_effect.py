@@ -1,11 +1,9 @@
 """Damping that grows with the cube of the speed: an effect of one's own, in one file."""
 
+from collections.abc import Mapping
 from typing import Any
 
-from chladni.models.core.parameter import Parameter, Parameters
-from chladni.models.core.port import Port
-from chladni.models.effects.attaching import LawAtPort
-from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni import EffectKind, LawAtPort, Parameter, Parameters, Port, Variant
 
 
 def cubic_damping(_d: float, s: float, _t: float, parameters: Any, _state: Any, _rates: Any) -> float:
@@ -13,7 +11,7 @@ def cubic_damping(_d: float, s: float, _t: float, parameters: Any, _state: Any, 
     return float(parameters[0] * s * s * s)
 
 
-def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
+def _numbers(values: Mapping[str, float], _port: Port) -> tuple[float, ...]:
     return (values["coefficient"],)
 
 
