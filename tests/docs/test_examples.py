@@ -1,4 +1,4 @@
-"""The example that takes minutes; `.ci/run` runs the others."""
+"""The examples that take longest; `.ci/run` runs the others."""
 
 import re
 import subprocess
@@ -17,3 +17,10 @@ def test_both_things_that_a_mujoco_model_forgot_are_named(tmp_path: Path) -> Non
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert re.search(r"friction at elbow .* and a delay of 6\.\d+ .*at shoulder_motor", said)
     assert (tmp_path / "arm.png").is_file()
+
+
+@pytest.mark.nightly
+def test_an_effect_of_ones_own_is_named() -> None:
+    command = [sys.executable, EXAMPLES / "own_effect_in_a_diagnosis.py"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert re.search(r"Most likely cubic drag of (199|200|201)\.", said)

@@ -41,6 +41,7 @@ def test_a_law_that_took_no_part_is_seen_to_follow_the_motion() -> None:
     assert law.named is None
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_what_remembers_is_seen_not_to_follow_it() -> None:
     loop = chladni.attached("hysteresis", "hand", {"force": 8.0, "yield": 3e-4, "shape": 1.0})
@@ -51,6 +52,7 @@ def test_what_remembers_is_seen_not_to_follow_it() -> None:
     assert law.law < 0.9 * law.force
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_beside_a_name_it_is_asked_only_where_that_leaves_more_than_noise() -> None:
     spring = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})

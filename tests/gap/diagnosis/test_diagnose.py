@@ -179,6 +179,7 @@ def test_a_sensor_that_clips_hard_is_named_although_it_looks_noisy(out: frozense
     assert found.where.channels[0].noise < 0.1
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_floor_that_shakes_is_told_and_its_sensors_foretell_each_other() -> None:
     floor = chladni.attached("base_vibration", "ground", {"level": 8.0, "band": 120.0, "band_start": 5.0})

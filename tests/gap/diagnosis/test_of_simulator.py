@@ -97,6 +97,7 @@ def of_friction():
     return found, told
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_friction_by_another_law_is_named():
     found, _ = of_friction()

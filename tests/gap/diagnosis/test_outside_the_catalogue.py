@@ -41,6 +41,7 @@ def test_a_wheel_that_spins_between_two_bodies_is_unknown() -> None:
     assert found.verdict == "unknown"
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @among_few("added_mass", "extra_mode", "mounting_resonance", "hysteresis")
 def test_rubber_is_no_mass_on_a_mount(out: frozenset[str]) -> None:
@@ -59,6 +60,7 @@ def test_a_joint_that_relaxes_a_little_passes_for_no_wrong_value() -> None:
     assert {one.site for one in stiffer.causes} == set(off)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_loop_is_believed_where_there_is_one() -> None:
     # Half of a millimetre and more: what yields sooner is friction.

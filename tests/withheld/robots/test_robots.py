@@ -100,6 +100,7 @@ def test_a_base_that_floats_obeys_mechanics_and_its_imu_feels_it():
     assert np.sqrt(np.mean((felt[:, inside] - between) ** 2)) < 0.03 * np.sqrt(np.mean(felt**2))
 
 
+@pytest.mark.nightly
 def test_an_afloat_case_has_its_imu_in_its_files():
     case = draw_case(5, 1, "afloat")
     assert 'base = "floating"' in case.model
@@ -202,6 +203,7 @@ def test_every_cause_changes_the_motion(word):
     raise AssertionError(word)
 
 
+@pytest.mark.nightly
 def test_the_same_seed_gives_the_same_case():
     one, same, other = (draw_case(seed, 1, "none") for seed in (5, 5, 6))
     assert (one.model, one.beside) == (same.model, same.beside)
