@@ -179,7 +179,7 @@ def _not_held(one: MachineJoint) -> Iterator[str]:
         at = ", ".join(f"{one.friction + each:.4g} {force} at {place:.4g} {angle}" for place, each in
                        zip(one.uneven.places, one.uneven.beyond, strict=True))  # fmt: skip
         yield f"{name}: friction that changes along its way, {at}; {one.friction:.4g} {force} are held"
-    if one.loop is not None:
+    if one.loop is not None and one.loop.force:
         yield f"{name}: friction of {one.loop.force:.4g} {force} that builds up over {one.loop.yields:.3g} {angle}"
     if one.ripple is not None:
         size = float(np.hypot(one.ripple.sine, one.ripple.cosine))

@@ -289,11 +289,15 @@ def _weighed(solved: Solved, place: int) -> Weighed:
 
 
 def _told(best: Fit, place: int) -> Mask:
-    """``[number]``: whether it's beyond its uncertainty, and not at the edge of what it can be."""
+    """``[number]``: whether it's beyond its uncertainty, and not at the edge of what it can be.
+
+    None at all of what a description states is no edge.
+    """
     values, deviations = best.values(place)
     term = best.terms[place]
     moved = values - term.nominal
-    return (np.abs(moved) > _SIGMAS * deviations) & (moved > term.least + 1e-3 * term.scale)
+    inside = (moved > term.least + 1e-3 * term.scale) | ((term.nominal > 0) & (term.least == -term.nominal))
+    return (np.abs(moved) > _SIGMAS * deviations) & inside
 
 
 def _candidate(solved: Solved, place: int) -> Candidate:

@@ -67,8 +67,9 @@ class Motion:
         least = LEAST / self.cutoff_hz * self.log.sample_rate_hz
         found = tuple((a, b) for a, b in pairwise(bounds) if b - a >= least)
         if not found:
+            damage = f" ({self.log.damage[0]})" if self.log.damage else ""
             raise LogError(
-                f"{self.log.log}: no stretch of {LEAST / self.cutoff_hz:.2g} s without a gap; record a longer one"
+                f"{self.log.log}: no stretch of {LEAST / self.cutoff_hz:.2g} s without a gap{damage}; record a longer one"
             )
         return found
 

@@ -11,9 +11,10 @@ from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.robots.diagnose import diagnose_robot
 from chladni.gap.robots.torques import torques_of
 from chladni.gap.robots.words import ROBOT_WORDS, all_terms
+from chladni.robots.loading import load_robot
 from chladni.robots.robot import Robot
 from chladni.signals.errors import LogError, ModelError, SetupError
-from tests.robots.machines import RATE_HZ, arm, commands, joint_log_of, run_native
+from tests.robots.machines import ARM, AS_DESCRIBED, RATE_HZ, arm, commands, joint_log_of, run_native
 
 pytest.importorskip("mujoco")
 
@@ -215,3 +216,26 @@ def test_a_word_may_be_left_out_at_one_site(tmp_path: Path) -> None:
         for left_out in (frozenset[str](), frozenset({"armature@elbow"}), frozenset({"armature"}))
     ]
     assert sites == [{"shoulder", "elbow"}, {"shoulder"}, set()]
+
+
+def test_damping_that_a_machine_has_none_of_is_a_wrong_value(tmp_path: Path) -> None:
+    machine = tmp_path / "machine" / "arm.xml"
+    machine.parent.mkdir()
+    machine.write_text(ARM.format(**AS_DESCRIBED).replace('damping="0.5"', 'damping="0"'))
+    command = commands(SECONDS)
+    position = run_native(load_robot(machine), command)
+    # Where readings would have it rather negative, none is what's left of it.
+    for seed in range(3):
+        noise = 2e-5 * np.random.default_rng(seed).standard_normal(position.shape)
+        found = diagnose_robot(arm(tmp_path), joint_log_of(arm(tmp_path), position + noise, command=command))
+        assert [(one.effect, one.site) for one in found.causes] == [("parameter", "shoulder.damping")]
+        value = found.causes[0].parameters["value"]
+        assert value.nominal == 0.5
+        assert value.value == pytest.approx(0.0, abs=max(3.0 * value.std, 0.1))
+
+
+def test_a_log_that_was_cut_short_is_told_so(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(1.0)
+    log = replace(joint_log_of(robot, command, command=command), damage=("the file ends within a chunk",))
+    with pytest.raises(LogError, match=r"without a gap \(the file ends within a chunk\); record a longer one"):
+        diagnose_robot(robot, log)
