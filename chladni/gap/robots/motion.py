@@ -69,7 +69,8 @@ class Motion:
         if not found:
             damage = f" ({self.log.damage[0]})" if self.log.damage else ""
             raise LogError(
-                f"{self.log.log}: no stretch of {LEAST / self.cutoff_hz:.2g} s without a gap{damage}; record a longer one"
+                f"{self.log.log}: no stretch of {LEAST / self.cutoff_hz:.2g} s without a gap{damage}; "
+                "record a longer one"
             )
         return found
 
