@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
 
-from chladni.gap.calibration import SAME
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.term import Term
 
@@ -22,23 +21,8 @@ _MOST = 60
 def searched(
     contest: Contest, begin: Fit | None = None, *, progress: Callable[[float], None] = lambda _: None
 ) -> Fit:
-    """Give the most probable set that moves lead to, from nothing or from another set.
-
-    Where more than noise is left, moves begin once more from what is found without drives that give more or less than
-    they're asked for: those explain a part of anything.
-    """
-    if begin is not None:
-        # One term whose columns fit better now may stand for all.
-        return _moved(contest, _best([_tidied(contest, begin), *_more(contest, contest.nothing)]), progress)
-    best = _moved(contest, contest.nothing, progress)
-    if all(one.over_noise < SAME for one in best.left):
-        return best
-    as_asked = contest.narrowed([one for one in contest.terms if not (one.over_gain or one.takes)])
-    other = contest.fit(_moved(as_asked, as_asked.nothing, progress).terms)
-    return _best([best, _moved(contest, _tidied(contest, other), progress)])
-
-
-def _moved(contest: Contest, best: Fit, progress: Callable[[float], None]) -> Fit:
+    """Give the most probable set that moves lead to, from nothing or from another set."""
+    best = contest.nothing if begin is None else _tidied(contest, begin)
     for move in range(_MOST):
         better = _tidied(contest, _best([best, *_more(contest, best)]))
         if better.nats < best.nats + _WORTH:
