@@ -3,25 +3,20 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
-import numpy as np
-
 from chladni.apps.documents import Document, finite, plain
 from chladni.apps.sources import Progress, Span, no_progress, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.envelope import Bearing, EnvelopeSpectrum, Kurtogram
 from chladni.signals.errors import EstimateError
-from chladni.signals.peak import Peak
 from chladni.spectral.envelope import BandChoice, chosen_bands, envelope_spectra, fault_frequencies_hz
-from chladni.spectral.peaks import find_peaks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LogEnvelopes:
-    """Envelope spectra of a log's channels with their named peaks, and what was left out, in sentences."""
+    """Envelope spectra of a log's channels, and what was left out, in sentences."""
 
     spectra: tuple[EnvelopeSpectrum, ...]
-    peaks: tuple[tuple[Peak, ...], ...]
     notes: tuple[str, ...]
 
 
@@ -66,17 +61,7 @@ def measure_envelopes(
     if not spectra:
         raise EstimateError(f"{log.path.name}: no envelope spectrum could be made: {'; '.join(notes)}")
     notes += [note for one in spectra for note in one.notes]
-    peaks = tuple(_named(one) for one in spectra)
-    return LogEnvelopes(spectra=tuple(spectra), peaks=peaks, notes=tuple(dict.fromkeys(notes)))
-
-
-def _named(found: EnvelopeSpectrum) -> tuple[Peak, ...]:
-    """Name the peaks, the highest line first."""
-
-    def depth(peak: Peak) -> float:
-        return -float(found.amplitude[np.argmin(np.abs(found.frequency_hz - peak.frequency_hz))])
-
-    return tuple(sorted(find_peaks(found.density), key=depth))
+    return LogEnvelopes(spectra=tuple(spectra), notes=tuple(dict.fromkeys(notes)))
 
 
 def _choices(
@@ -100,12 +85,12 @@ def envelope_document(found: LogEnvelopes) -> Document:
     """Document of ``chladni envelope``."""
     return {
         "format": "chladni.envelope/1",
-        "channels": [_channel(one, peaks) for one, peaks in zip(found.spectra, found.peaks, strict=True)],
+        "channels": [_channel(one) for one in found.spectra],
         "notes": list(found.notes),
     }
 
 
-def _channel(found: EnvelopeSpectrum, peaks: Sequence[Peak]) -> Document:
+def _channel(found: EnvelopeSpectrum) -> Document:
     return {
         "name": found.channel.name,
         "unit": found.channel.unit,
@@ -117,7 +102,8 @@ def _channel(found: EnvelopeSpectrum, peaks: Sequence[Peak]) -> Document:
         "frequency_hz": plain(found.frequency_hz),
         "amplitude": plain(found.amplitude),
         "peaks": [
-            {"frequency_hz": peak.frequency_hz, "frequency_std_hz": finite(peak.frequency_std_hz)} for peak in peaks
+            {"frequency_hz": peak.frequency_hz, "frequency_std_hz": finite(peak.frequency_std_hz)}
+            for peak in found.peaks
         ],
         "faults": [asdict(fault) for fault in found.faults],
         "kurtogram": None if found.kurtogram is None else _kurtogram(found.kurtogram),

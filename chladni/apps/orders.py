@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from chladni.apps.sources import Span
+from chladni.apps.sources import Span, moving_channels
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import EstimateError
@@ -71,7 +71,7 @@ def track_orders(
     try:
         turned = rotation(told, **({telling: name} | how))
         # A ridge is a vibration itself.
-        series = _tracked(log, channels, () if turned.source == "ridge" else (name,), span)
+        series = _moving(_tracked(log, channels, () if turned.source == "ridge" else (name,), span))
         window: dict[str, Any] = {} if revolutions is None else {"revolutions": revolutions}
         maps = tuple(order_map(one, turned, highest_order=highest_order, **window) for one in series)
         wanted = strongest_orders(maps, count=ORDERS_TOLD) if orders is None else orders
@@ -79,6 +79,15 @@ def track_orders(
     except EstimateError as error:
         raise EstimateError(f"{log.path.name}: {error}") from error
     return OrderStudy(rotation=turned, maps=maps, cuts=cuts)
+
+
+def _moving(groups: Sequence[TimeSeries]) -> tuple[TimeSeries, ...]:
+    """Leave out what never changes: all that its orders would show is rounding."""
+    kept = [moving_channels(one) for one in groups]
+    if not any(kept):
+        still = [channel.name for one in groups for channel in one.channels]
+        raise EstimateError(f"{some_of(still)} never changes, so it has no orders; name another channel (--channel)")
+    return tuple(one.select(names) for one, names in zip(groups, kept, strict=True) if names)
 
 
 def _tracked(log: Log, channels: Sequence[str] | None, shaft: Sequence[str], span: Span) -> tuple[TimeSeries, ...]:

@@ -1,6 +1,6 @@
 """Spectra of a log against the profile of a random vibration test."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from chladni.apps.sources import Progress, Span, no_progress
@@ -19,6 +19,7 @@ class Tolerated:
 
     density: PowerSpectralDensity
     check: ProfileCheck
+    notes: tuple[str, ...] = ()
 
 
 def tolerated(
@@ -50,6 +51,19 @@ def tolerated(
                 "give the channel's unit in a setup file (--setup), or the profile's (--unit)"
             )
     try:
-        return tuple(Tolerated(density=one, check=check_profile(one, profile)) for one in found)
+        return tuple(
+            Tolerated(density=one, check=check_profile(one, profile), notes=tuple(_unjudged(one, profile)))
+            for one in found
+        )
     except EstimateError as error:
         raise EstimateError(f"{log.path.name}: {error}") from error
+
+
+def _unjudged(density: PowerSpectralDensity, profile: RandomProfile) -> Iterator[str]:
+    """Tell what of the profile lies above the spectrum."""
+    highest_hz, end_hz = float(density.frequency_hz[-1]), float(profile.frequency_hz[-1])
+    if end_hz > highest_hz:
+        yield (
+            f"{some_of([channel.name for channel in density.channels])}: the profile ends at {end_hz:g} Hz, the "
+            f"spectrum at {highest_hz:g} Hz; what lies between is not judged: sample faster"
+        )

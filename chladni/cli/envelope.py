@@ -114,9 +114,10 @@ def _print_bands(out: Output, found: "LogEnvelopes") -> None:
                 f"{number(one.band_hz[0])} to {number(one.band_hz[1])}",
                 number(one.band_kurtosis, digits=3),
                 number(float(one.frequency_hz[1])),
-                ", ".join(with_error(peak.frequency_hz, peak.frequency_std_hz) for peak in peaks[:MOST_PEAKS]) or "-",
+                ", ".join(with_error(peak.frequency_hz, peak.frequency_std_hz) for peak in one.peaks[:MOST_PEAKS])
+                or "-",
             ]
-            for one, peaks in zip(found.spectra, found.peaks, strict=True)
+            for one in found.spectra
         ],
     )
 

@@ -77,6 +77,8 @@ def levels(
         _print_levels(out, one)
     for judged in found.severities:
         _print_severity(out, judged)
+    if found.severities and machine is None:
+        out.lines(("no zone of severity is told: it needs the machine's class (--machine)",))
     out.lines((*told, *found.notes))
     if csv is not None:
         from chladni.io.files.levels_table import write_levels_csv

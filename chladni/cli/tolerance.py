@@ -62,7 +62,7 @@ def tolerance(
         )
         told = reading_sentences(opened, everything=channel is None)
     _print_checks(out, found, unit)
-    out.lines((*told, *(note for one in found for note in one.density.provenance.notes)))
+    out.lines((*told, *(note for one in found for note in (*one.notes, *one.density.provenance.notes))))
     if figures is not None:
         _save_figures(out, found, unit, figures)
     out.json(tolerance_document(found))

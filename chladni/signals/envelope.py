@@ -9,6 +9,7 @@ import numpy as np
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
+from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.value import Value, require_shape
 
@@ -160,6 +161,8 @@ class EnvelopeSpectrum(Value):
         By which the band was chosen; None where it was named.
     faults
         The bearing's frequencies and their multiples; empty without a bearing.
+    peaks
+        Lines that stand out, the highest first; their heights are amplitudes. Empty where nothing repeats.
     notes
         What to distrust, in sentences.
     """
@@ -174,6 +177,7 @@ class EnvelopeSpectrum(Value):
     mean: float
     kurtogram: Kurtogram | None = None
     faults: tuple[FaultLine, ...] = ()
+    peaks: tuple[Peak, ...] = ()
     notes: tuple[str, ...] = ()
 
     def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002

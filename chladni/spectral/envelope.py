@@ -11,12 +11,14 @@ from chladni.signals.channel import Channel, Names
 from chladni.signals.envelope import Bearing, EnvelopeSpectrum, FaultLine, Kurtogram
 from chladni.signals.errors import SetupError
 from chladni.signals.number_range import require_in_range
+from chladni.signals.peak import Peak
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import power
 from chladni.spectral.accumulator import AutoSpectraAccumulator
 from chladni.spectral.band_filter import BandFilter
 from chladni.spectral.blocks import Source, leading_part
 from chladni.spectral.kurtogram import kurtogram
+from chladni.spectral.peaks import find_peaks
 from chladni.spectral.power_spectral_density import power_spectral_density
 from chladni.spectral.segmentation import plan_segmentation
 
@@ -221,7 +223,9 @@ class EnvelopeAccumulator:
             kurtogram=self.choice.kurtogram,
             notes=(*self.choice.notes, *density.provenance.notes),
         )
-        return replace(found, faults=tuple(_fault_lines(found, faults_hz)))
+        peaks = _peaks(found)
+        still = () if peaks else (_told_still(self.channel, density.frequency_hz[1]),)
+        return replace(found, faults=tuple(_fault_lines(found, faults_hz)), peaks=peaks, notes=(*found.notes, *still))
 
     def _add(self, squared: TimeSeries) -> None:
         if self._exponent is None and squared.values.any():
@@ -231,6 +235,23 @@ class EnvelopeAccumulator:
         self._spectra.update(replace(squared, values=values))
         self._sum += float(values.sum())
         self._samples += squared.samples
+
+
+def _told_still(channel: Channel, spacing_hz: float) -> str:
+    return f"{channel.name}: no line of the envelope stands out; with lines {spacing_hz:.3g} Hz apart nothing repeats"
+
+
+def _peaks(found: EnvelopeSpectrum) -> tuple[Peak, ...]:
+    """Name the lines that stand out, the highest first, by their amplitudes."""
+    unit = found.density.channels[0].unit
+    peaks = []
+    for peak in find_peaks(found.density):
+        line = int(np.argmin(np.abs(found.frequency_hz - peak.frequency_hz)))
+        height = float(found.amplitude[line])
+        # An amplitude is the root of a power.
+        std = height * peak.height_std / (2 * peak.height)
+        peaks.append(replace(peak, height=height, height_std=std, unit=unit))
+    return tuple(sorted(peaks, key=lambda peak: -peak.height))
 
 
 def _fault_lines(found: EnvelopeSpectrum, faults_hz: Mapping[str, float]) -> Iterator[FaultLine]:

@@ -56,6 +56,10 @@ def random_profile(
     """
     factor, si_unit = si_factor(unit)
     points = np.asarray(list(breakpoints), dtype=np.float64).reshape(-1, 2)
+    falls = np.flatnonzero(~(np.diff(points[:, 0]) > 0))
+    if falls.size:
+        before, after = points[falls[0] : falls[0] + 2, 0]
+        raise EstimateError(f"breakpoint {after:g} Hz follows {before:g} Hz; give them in rising order, each once")
     return RandomProfile(
         frequency_hz=points[:, 0],
         density=points[:, 1] * factor**2,

@@ -102,6 +102,8 @@ def _from_pulses(series: TimeSeries, pulses_a_revolution: float, threshold: floa
     values = np.where(measured_samples(series)[0], series.values[0].astype(np.float64), np.nan)
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+    if not low < high:
+        raise EstimateError(f"{name} never changes, so it tells no rotation; name the channel of the pulses")
     level = (low + high) / 2 if threshold is None else threshold
     edges = _rising_edges(values, level, HYSTERESIS * min(high - level, level - low))
     if edges.size < 4:

@@ -131,3 +131,8 @@ def test_a_channel_that_is_named_is_told_though_it_is_still(run, tmp_path):
     assert (refused.code, "never change" in refused.err) == (2, True)
     (channel,) = run("levels", tmp_path / "still.mcap", "--channel", WRIST, "--json", "-").document["channels"]
     assert (channel["bands"][0]["rms"], channel["bands"][0]["kurtosis"]) == (0.0, None)
+
+
+def test_without_the_class_of_the_machine_the_way_to_a_zone_is_told(run, log):
+    assert "it needs the machine's class (--machine)" in run("levels", log).out
+    assert "it needs the machine's class" not in run("levels", log, "--machine", "large-rigid").out

@@ -74,3 +74,17 @@ def test_bad_options_are_told_in_one_line(run, run_up, options, words):
     refused = run("orders", run_up, *options)
     assert (refused.code, refused.err.count("\n")) == (2, 1)
     assert words in refused.err
+
+
+def test_a_channel_that_never_changes_has_no_orders_and_tells_no_rotation(run, tmp_path):
+    time_s = np.arange(8000) / 1000
+    pulses = (np.mod(10 * time_s, 1) < 0.1).astype(float)
+    rows = "\n".join(f"{t},{p},3.3" for t, p in zip(time_s, pulses, strict=True))
+    path = tmp_path / "still.csv"
+    path.write_text(f"time [s],tacho [V],still [m/s^2]\n{rows}\n", encoding="utf-8")
+    outcome = run("orders", path, "--tacho", "tacho", "--channel", "still")
+    assert outcome.code == 2
+    assert "still.csv: still never changes, so it has no orders; name another channel" in outcome.err
+    outcome = run("orders", path, "--tacho", "still")
+    assert outcome.code == 2
+    assert "still.csv: still never changes, so it tells no rotation" in outcome.err

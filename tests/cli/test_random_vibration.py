@@ -71,3 +71,16 @@ def test_bad_options_are_told_in_one_line(run, shaken, arguments, words):
     refused = run(arguments[0], shaken, *arguments[1:])
     assert (refused.code, refused.err.count("\n")) == (2, 1)
     assert words in refused.err
+
+
+def test_what_the_spectrum_does_not_reach_of_a_profile_is_told(run, shaken):
+    outcome = run("tolerance", shaken, "10:0.01", "2000:0.01", "--resolution", 4)
+    assert outcome.code == 0, outcome.err
+    assert "the profile ends at 2000 Hz, the spectrum at 500 Hz; what lies between is not judged" in outcome.out
+    assert "is not judged" not in run("tolerance", shaken, *PROFILE, "--resolution", 4).out
+
+
+def test_breakpoints_out_of_order_are_named(run, shaken):
+    outcome = run("tolerance", shaken, "80:0.1", "20:0.1")
+    assert outcome.code == 2
+    assert "breakpoint 20 Hz follows 80 Hz; give them in rising order" in outcome.err

@@ -133,3 +133,17 @@ def test_what_can_not_be_done_is_refused():
             Bearing(**{"elements": 9, "element_diameter": 0.3, "pitch_diameter": 1.5} | values)
     with pytest.raises(EstimateError, match="must turn"):
         SKF_6205.frequencies_hz(0.0)
+
+
+def test_lines_that_stand_out_are_named_by_their_amplitude_and_their_absence_is_told():
+    # (1 + cos a)^2/2 of a carrier: amplitudes 2 and 0.5 of sines at 87 and 174 Hz in the squared envelope.
+    time_s = np.arange(40_000) / 10_000
+    blows = (1 + np.cos(2 * np.pi * 87 * time_s)) * np.sin(2 * np.pi * 3000 * time_s)
+    (found,) = envelope(series(blows, rate_hz=1e4), band_hz=(2500, 3500))
+    assert [round(peak.frequency_hz) for peak in found.peaks[:2]] == [87, 174]
+    assert [peak.height for peak in found.peaks[:2]] == pytest.approx([2.0, 0.5], rel=0.01)
+    once = np.zeros(40_000)
+    once[20_000] = 1.0
+    (still,) = envelope(series(once, rate_hz=1e4), band_hz=(1000, 4000))
+    assert still.peaks == ()
+    assert "no line of the envelope stands out" in still.notes[-1]

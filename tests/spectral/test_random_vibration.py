@@ -63,7 +63,7 @@ def test_what_lies_outside_the_tolerance_is_told():
     [
         ([(20, 0.1)], {}, "two breakpoints or more"),
         ([(0, 0.1), (20, 0.1)], {}, "above 0 Hz"),
-        ([(20, 0.1), (10, 0.1)], {}, "strictly rising"),
+        ([(20, 0.1), (10, 0.1)], {}, "10 Hz follows 20 Hz"),
         ([(20, 0.1), (30, 0.0)], {}, "finite and above 0"),
         (NAVMAT, {"upper_db": -1.0}, "both must be 0 or more"),
         (NAVMAT, {"unit": "gg"}, "gg"),

@@ -375,3 +375,12 @@ def test_no_window_system_is_touched() -> None:
     root = Path(__file__).parents[2]
     done = subprocess.run([sys.executable, "-c", program], check=True, cwd=root, capture_output=True, text=True)
     assert done.stdout == "False\n"
+
+
+def test_a_cepstrum_names_its_peaks_in_words():
+    import chladni
+
+    x = np.random.default_rng(1).standard_normal(40_080)
+    axes = chladni.cepstrum(x[80:] + 0.6 * x[:-80], sample_rate_hz=8000.0).plot()
+    words = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert any(word.startswith("peaks: 10") and word.endswith(" ms") for word in words)

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from chladni.signals.envelope import EnvelopeSpectrum, Kurtogram
 from chladni.signals.study import Study
+from chladni.viewers.figures.peak_labels import STRIP_POINTS, label_peaks
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import ON_LIGHT, Colour, Style
@@ -35,11 +36,10 @@ def envelope_label(found: EnvelopeSpectrum) -> str:
 
 def _figure(found: EnvelopeSpectrum, style: Style) -> Figure:
     heights = [SPECTRUM_IN] if found.kurtogram is None else [KURTOGRAM_IN, SPECTRUM_IN]
-    figure, stack = sheet(heights)
+    figure, stack = sheet(heights, above_points=STRIP_POINTS if found.peaks else 0.0)
     if found.kurtogram is not None:
         draw_kurtogram(stack[0], gram=found.kurtogram, band_hz=found.band_hz)
         stack[0].set_xlabel("Frequency [Hz]")
-    stack[0].set_title(plain(style.labels[found.channel.name]), loc="left", pad=3)
     draw_envelope(stack[-1], found=found, style=style)
     stack[-1].set_xlabel(envelope_label(found))
     return figure
@@ -57,7 +57,10 @@ def draw_kurtogram(axes: Axes, gram: Kurtogram, band_hz: tuple[float, float], *,
     axes.add_collection(bands)
     chosen = int(np.argmin(np.abs(gram.low_hz - band_hz[0]) + np.abs(gram.high_hz - band_hz[1])))
     frame = PolyCollection([boxes[chosen]], facecolors="none", edgecolors=[paint(FRAME)], linewidths=1.4)
+    # Those from 0 Hz are never taken, however bright.
+    frame.set_label("the band that is taken, not from 0 Hz")
     axes.add_collection(frame)
+    legend(axes)
     axes.set_xlim(0.0, gram.high_hz[0])
     axes.set_ylim(levels.max() + 0.5, -0.5)
     ticks = list(range(0, levels.max() + 1, 3))
@@ -80,10 +83,13 @@ def draw_envelope(axes: Axes, found: EnvelopeSpectrum, style: Style) -> None:
     end_hz = min(highest_hz or frequency_hz[min(MOST_LINES, frequency_hz.size - 1)], float(frequency_hz[-1]))
     shown = (np.arange(frequency_hz.size) >= LINES_LEFT_OUT) & (frequency_hz <= end_hz)
     top = float(amplitude[shown].max(initial=0.0)) or 1.0
+    colour, label = paint(style.on_light(found.channel)), plain(style.labels[found.channel.name])
+    label += "" if found.peaks else ": no line stands out"
+    axes.plot(frequency_hz[shown], amplitude[shown], color=colour, label=label)
     _marks(axes, found)
-    axes.plot(frequency_hz[shown], amplitude[shown], color=paint(style.on_light(found.channel)))
     axes.set_xlim(0.0, end_hz)
     axes.set_ylim(0.0, 1.05 * top)
+    legend(axes, above_points=label_peaks(axes, found.peaks))
     axes.set_ylabel(f"Squared envelope [{printed_unit(found.density.channels[0].unit)}]")
 
 
@@ -100,8 +106,6 @@ def _marks(axes: Axes, found: EnvelopeSpectrum) -> None:
         axes.axvline(
             fault.expected_hz, color=paint(drawn[name]), linewidth=0.7, linestyle="--", zorder=1, label=label
         )
-    if drawn:
-        legend(axes)
 
 
 def _hertz(frequency_hz: float) -> str:

@@ -61,6 +61,7 @@ def draw_strength(axes: Axes, levels: Levels, column: int, group: Group, style: 
         colour = paint(style.on_light(channel))
         _line(axes, time_s, running.rms[row, column], color=colour, label=plain(style.labels[channel.name]))
         _line(axes, time_s, running.peak[row, column], color=colour, alpha=PEAK_OPACITY, linewidth=0.6)
+    axes.plot([], [], color="#555555", alpha=PEAK_OPACITY, linewidth=0.6, label="peak")
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(f"RMS, peak [{printed_unit(group.unit)}]")
     _span(axes, running, style)
@@ -76,9 +77,10 @@ def draw_kurtosis(axes: Axes, levels: Levels, column: int, group: Group, style: 
     # Never below 1; from single blows it reaches hundreds.
     highest = float(np.nanmax(running.kurtosis[list(group.rows), column], initial=0.0))
     logarithmic(axes, 1.0, max(10.0, 1.3 * highest))
-    axes.axhline(GAUSSIAN_KURTOSIS, color="#777777", linewidth=0.6, linestyle="--")
+    axes.axhline(GAUSSIAN_KURTOSIS, color="#777777", linewidth=0.6, linestyle="--", label="Gaussian noise: 3")
     axes.set_ylabel("Kurtosis")
     _span(axes, running, style)
+    legend(axes)
 
 
 def levels_label(levels: Levels, column: int) -> str:
@@ -97,7 +99,8 @@ def _severity_figure(severity: Severity, group: Group, style: Style) -> Figure:
 def severity_label(severity: Severity) -> str:
     """Say what runs along the axis of a picture of severity."""
     low_hz, high_hz = severity.band_hz
-    return f"Time [s], windows of {severity.running.window_s:.3g} s, {low_hz:.4g} to {high_hz:.4g} Hz"
+    zones = f"\nzones A to D of ISO 20816-3: {severity.machine}" if severity.zones else ""
+    return f"Time [s], windows of {severity.running.window_s:.3g} s, {low_hz:.4g} to {high_hz:.4g} Hz{zones}"
 
 
 def draw_severity(axes: Axes, severity: Severity, group: Group, style: Style) -> None:
