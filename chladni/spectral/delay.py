@@ -148,7 +148,11 @@ def time_delay(
         raise EstimateError(f"a band from {low_hz:g} to {high_hz:g} Hz isn't one within 0 to {nyquist_hz:g} Hz")
     filtered = _within(chosen, low_hz, high_hz)
     longest_s = filtered.duration_s / 10 if longest_delay_s is None else longest_delay_s
-    correlation = cross_correlation(filtered, references=references, responses=responses, longest_lag_s=longest_s)
+    whole = cross_correlation(filtered, references=references, responses=responses)
+    if round(longest_s * chosen.sample_rate_hz) > 0 and longest_s < whole.lag_s[-1]:
+        correlation = _up_to(whole, longest_s, (low_hz, high_hz))
+    else:
+        correlation = cross_correlation(filtered, references=references, responses=responses, longest_lag_s=longest_s)
     found = [
         _fitted(
             chosen.select([correlation.reference.name, channel.name]),
@@ -213,6 +217,27 @@ def _correlated(series: TimeSeries, values: Real, longest: int) -> CrossCorrelat
         responses=series.channels[1:],
         reference=series.channels[0],
     )
+
+
+def _up_to(whole: CrossCorrelation, longest_s: float, band_hz: tuple[float, float]) -> CrossCorrelation:
+    """Cut a correlation to the lags that are asked for; where a higher one lies beyond, a peak has to stand inside.
+
+    Unrelated signals of bandwidth B correlate by chance with a deviation of 1/sqrt(2 B T) (Bendat & Piersol 2010, ch. 8).
+    """
+    step_s = float(whole.lag_s[1] - whole.lag_s[0])
+    inside = np.abs(whole.lag_s) < longest_s + 0.5 * step_s
+    # A correlation reaches to half the record.
+    independent = 4 * (band_hz[1] - band_hz[0]) * float(whole.lag_s[-1])
+    by_chance = np.sqrt(2 * np.log(inside.sum() / BY_CHANCE) / independent)
+    for channel, row in zip(whole.responses, np.abs(whole.values), strict=True):
+        best, near = int(row.argmax()), row[inside]
+        is_peak = 0 < near.argmax() < near.size - 1 and near.max() > by_chance
+        if near.max() < RIVAL * row[best] and not is_peak:
+            raise EstimateError(
+                f"{channel.name}: no peak of the correlation stands within {longest_s:g} s, and the highest, "
+                f"{row[best]:.2f}, lies at {whole.lag_s[best]:.4g} s; look for delays as long as that"
+            )
+    return replace(whole, lag_s=whole.lag_s[inside], values=whole.values[:, inside])
 
 
 def _within(series: TimeSeries, low_hz: float, high_hz: float) -> TimeSeries:

@@ -92,6 +92,24 @@ def test_over_a_gap_nothing_is_correlated():
     assert found.delay_s[0] == pytest.approx(0.02, abs=1e-6)
 
 
+def test_a_delay_beyond_the_longest_is_refused_with_where_it_is():
+    x = smooth_noise(8000)
+    pair = series(np.stack([x, delayed(x, 0.005)]), rate_hz=RATE_HZ)
+    with pytest.raises(EstimateError, match=r"no peak .* within 0.001 s, and the highest, 1.00, lies at 0.005 s"):
+        time_delay(pair, references="a", longest_delay_s=0.001, band_hz=(10.0, 250.0))
+    found = time_delay(pair, references="a", longest_delay_s=0.006, band_hz=(10.0, 250.0))
+    assert found.delay_s[0] == pytest.approx(0.005, abs=1e-6)
+
+
+def test_a_weaker_path_is_found_where_a_stronger_one_is_excluded():
+    x = smooth_noise(20_000)
+    both = 0.5 * delayed(x, 0.01) + delayed(x, 0.2)
+    found = time_delay(
+        series(np.stack([x, both]), rate_hz=RATE_HZ), references="a", longest_delay_s=0.05, band_hz=(10.0, 250.0)
+    )
+    assert found.delay_s[0] == pytest.approx(0.01, abs=3e-4)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
