@@ -222,7 +222,8 @@ def _correlated(series: TimeSeries, values: Real, longest: int) -> CrossCorrelat
 def _up_to(whole: CrossCorrelation, longest_s: float, band_hz: tuple[float, float]) -> CrossCorrelation:
     """Cut a correlation to the lags that are asked for; where a higher one lies beyond, a peak has to stand inside.
 
-    Unrelated signals of bandwidth B correlate by chance with a deviation of 1/sqrt(2 B T) (Bendat & Piersol 2010, ch. 8).
+    Unrelated signals of bandwidth B correlate by chance with a deviation of 1/sqrt(2 B T) (Bendat & Piersol 2010,
+    ch. 8).
     """
     step_s = float(whole.lag_s[1] - whole.lag_s[0])
     inside = np.abs(whole.lag_s) < longest_s + 0.5 * step_s
