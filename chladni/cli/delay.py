@@ -91,8 +91,6 @@ def _print_delays(out: Output, found: "TimeDelays") -> None:
 
 
 def _save_figures(out: Output, found: "TimeDelays", folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
     from chladni.viewers.figures.correlation import delay_figures
 
-    for path in save_album(Album({"delay": delay_figures(found)}), folder):
-        out.line(f"figure: {path}")
+    out.figures("delay", delay_figures(found), folder)

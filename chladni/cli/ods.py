@@ -80,8 +80,6 @@ def _print_shapes(out: Output, found: "DeflectionShapes") -> None:
 
 
 def _save_figures(out: Output, found: "DeflectionShapes", folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
     from chladni.viewers.figures.deflection import deflection_figures
 
-    for path in save_album(Album({"ods": deflection_figures(found)}), folder):
-        out.line(f"figure: {path}")
+    out.figures("ods", deflection_figures(found), folder)

@@ -145,8 +145,6 @@ def _print_cuts(out: Output, cuts: "OrderCuts") -> None:
 
 
 def _save_figures(out: Output, found: "OrderStudy", folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
     from chladni.viewers.figures.orders import order_figures
 
-    for path in save_album(Album({"orders": order_figures(found.maps, found.cuts)}), folder):
-        out.line(f"figure: {path}")
+    out.figures("orders", order_figures(found.maps, found.cuts), folder)

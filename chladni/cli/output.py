@@ -22,6 +22,8 @@ from chladni.signals.visible import visible, visible_json, visible_lines
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chladni.signals.study import Study
     from chladni.signals.value import Value
 
@@ -130,6 +132,13 @@ class Output:
 
             write_report(study, report, album=album)
             self.line(f"report: {report}")
+
+    def figures(self, command: str, drawn: "Mapping[str, Figure]", folder: Path) -> None:
+        """Save the figures of a command in a folder, and say where they are."""
+        from chladni.viewers.figures import Album, save_album
+
+        for path in save_album(Album({command: drawn}), folder):
+            self.line(f"figure: {path}")
 
     def json(self, content: Mapping[str, Any]) -> None:
         """Write `content` where ``--json`` said; nothing when it wasn't given."""

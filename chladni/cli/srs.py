@@ -101,8 +101,6 @@ def _print_highest(out: Output, found: "ShockResponse") -> None:
 
 
 def _save_figures(out: Output, found: "Sequence[ShockResponse]", folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
     from chladni.viewers.figures.shock import shock_figures
 
-    for path in save_album(Album({"srs": shock_figures(found)}), folder):
-        out.line(f"figure: {path}")
+    out.figures("srs", shock_figures(found), folder)

@@ -111,9 +111,7 @@ def _row(one: "Tolerated", row: int, factor: float, unit: str) -> list[str]:
 
 
 def _save_figures(out: Output, found: "Sequence[Tolerated]", unit: str, folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
     from chladni.viewers.figures.random_vibration import tolerance_figures
 
     drawn = tolerance_figures([one.density for one in found], found[0].check.profile, unit=unit)
-    for path in save_album(Album({"tolerance": drawn}), folder):
-        out.line(f"figure: {path}")
+    out.figures("tolerance", drawn, folder)

@@ -72,10 +72,8 @@ def _print_highest(out: Output, found: "Sequence[AmplitudeSpectrum]") -> None:
 
 
 def _save_figures(out: Output, found: "Sequence[AmplitudeSpectrum]", folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
     from chladni.viewers.figures.amplitude import amplitude_figures
 
     drawn = {f"zoom {place} {name}": figure for place, one in enumerate(found, start=1)
              for name, figure in amplitude_figures(one).items()}  # fmt: skip
-    for path in save_album(Album({"zoom": drawn}), folder):
-        out.line(f"figure: {path}")
+    out.figures("zoom", drawn, folder)
