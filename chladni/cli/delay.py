@@ -8,7 +8,6 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number, with_error
 
 if TYPE_CHECKING:
@@ -54,8 +53,7 @@ def delay(
     from chladni.apps.findings import reading_sentences
     from chladni.apps.sources import Span
 
-    require_places(reads=[log, opener.setup], writes={"--json": json}, folders={"--figures": figures})
-    out = Output(json)
+    out = Output.of_log([log, opener.setup], json=json, figures=figures)
     with opener(log) as opened:
         found = log_delays(
             opened,

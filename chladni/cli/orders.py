@@ -8,7 +8,6 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number, unit
 
 if TYPE_CHECKING:
@@ -75,8 +74,7 @@ def orders(
     from chladni.apps.orders import track_orders
     from chladni.apps.sources import Span
 
-    require_places(reads=[log, opener.setup], writes={"--json": json}, folders={"--figures": figures})
-    out = Output(json)
+    out = Output.of_log([log, opener.setup], json=json, figures=figures)
     shaft, telling = _telling(tacho=tacho, phase=phase, speed=speed, ridge=ridge)
     with opener(log) as opened:
         found = track_orders(

@@ -8,7 +8,6 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number, unit
 
 if TYPE_CHECKING:
@@ -55,9 +54,7 @@ def srs(
     from chladni.apps.shock import shock_responses
     from chladni.apps.sources import Span
 
-    reads = [log, opener.setup]
-    require_places(reads=reads, writes={"--json": json, "--csv": csv}, folders={"--figures": figures})
-    out = Output(json, csv)
+    out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures)
     with opener(log) as opened:
         found = shock_responses(
             opened,
@@ -73,7 +70,7 @@ def srs(
     for one in found:
         _print_highest(out, one)
     out.lines((*told, *(note for one in found for note in one.notes)))
-    out.csv(found, reads=reads)
+    out.csv(found)
     if figures is not None:
         _save_figures(out, found, figures)
     out.json(shock_document(found))

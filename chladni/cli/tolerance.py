@@ -8,7 +8,6 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number
 
 if TYPE_CHECKING:
@@ -48,8 +47,7 @@ def tolerance(
     from chladni.apps.tolerance import tolerated
     from chladni.spectral.random_vibration import random_profile
 
-    require_places(reads=[log, opener.setup], writes={"--json": json}, folders={"--figures": figures})
-    out = Output(json)
+    out = Output.of_log([log, opener.setup], json=json, figures=figures)
     profile = random_profile([*map(_point, breakpoints)], unit=unit, upper_db=upper, lower_db=lower)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = tolerated(
