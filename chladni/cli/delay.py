@@ -1,6 +1,5 @@
 """``chladni delay``: how much later motion arrives."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -68,7 +67,9 @@ def delay(
     _print_delays(out, found)
     out.lines((*told, *found.notes))
     if figures is not None:
-        _save_figures(out, found, figures)
+        from chladni.viewers.figures.correlation import delay_figures
+
+        out.figures("delay", delay_figures(found), figures)
     out.json(delay_document(found))
 
 
@@ -86,9 +87,3 @@ def _print_delays(out: Output, found: "TimeDelays") -> None:
             for row, channel in enumerate(found.responses)
         ],
     )
-
-
-def _save_figures(out: Output, found: "TimeDelays", folder: Path) -> None:
-    from chladni.viewers.figures.correlation import delay_figures
-
-    out.figures("delay", delay_figures(found), folder)

@@ -1,6 +1,5 @@
 """``chladni ods``: how all points move together as the machine runs."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -53,7 +52,9 @@ def ods(
     _print_shapes(out, found)
     out.lines((*told, *found.provenance.notes))
     if figures is not None:
-        _save_figures(out, found, figures)
+        from chladni.viewers.figures.deflection import deflection_figures
+
+        out.figures("ods", deflection_figures(found), figures)
     out.json(deflection_document(found))
 
 
@@ -75,9 +76,3 @@ def _print_shapes(out: Output, found: "DeflectionShapes") -> None:
                 for column, channel in enumerate(found.channels)
             ],
         )
-
-
-def _save_figures(out: Output, found: "DeflectionShapes", folder: Path) -> None:
-    from chladni.viewers.figures.deflection import deflection_figures
-
-    out.figures("ods", deflection_figures(found), folder)

@@ -1,6 +1,5 @@
 """``chladni orders``: vibration in multiples of a shaft's speed."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -11,7 +10,6 @@ from chladni.cli.output import Output
 from chladni.cli.words import number, unit
 
 if TYPE_CHECKING:
-    from chladni.apps.orders import OrderStudy
     from chladni.signals.order_spectra import OrderCuts
 
 RPM = 60.0
@@ -97,7 +95,9 @@ def orders(
         _print_cuts(out, cuts)
     out.lines((*told, *found.rotation.notes))
     if figures is not None:
-        _save_figures(out, found, figures)
+        from chladni.viewers.figures.orders import order_figures
+
+        out.figures("orders", order_figures(found.maps, found.cuts), figures)
     out.json(orders_document(found))
 
 
@@ -140,9 +140,3 @@ def _print_cuts(out: Output, cuts: "OrderCuts") -> None:
         ["channel", "order", "peak amplitude", "unit", "at [rpm]", "frequency [Hz]", "time [s]"],
         rows,
     )
-
-
-def _save_figures(out: Output, found: "OrderStudy", folder: Path) -> None:
-    from chladni.viewers.figures.orders import order_figures
-
-    out.figures("orders", order_figures(found.maps, found.cuts), folder)

@@ -1,6 +1,5 @@
 """``chladni srs``: what a shock does to what it shakes."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -11,8 +10,6 @@ from chladni.cli.output import Output
 from chladni.cli.words import number, unit
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from chladni.signals.shock_response import ShockResponse
 
 
@@ -72,7 +69,9 @@ def srs(
     out.lines((*told, *(note for one in found for note in one.notes)))
     out.csv(found)
     if figures is not None:
-        _save_figures(out, found, figures)
+        from chladni.viewers.figures.shock import shock_figures
+
+        out.figures("srs", shock_figures(found), figures)
     out.json(shock_document(found))
 
 
@@ -95,9 +94,3 @@ def _print_highest(out: Output, found: "ShockResponse") -> None:
             for row in rows
         ],
     )
-
-
-def _save_figures(out: Output, found: "Sequence[ShockResponse]", folder: Path) -> None:
-    from chladni.viewers.figures.shock import shock_figures
-
-    out.figures("srs", shock_figures(found), folder)
