@@ -389,8 +389,8 @@ def _slow_variance(density: PowerSpectralDensity, whole: Sequence[float]) -> tup
     if not slow:
         return ()
     note = (
-        f"{some_of(slow)}: up to {share.max():.0%} of the variance is slower than {low_hz:.3g} Hz, where a trend "
-        "leaks and no peak is looked for, or at the ends of the record; if it isn't drift, "
+        f"{some_of(slow)}: up to {share.max():.0%} of the variance is slower than {low_hz:.3g} Hz, or at the ends of "
+        "the record. Below that a trend leaks and no peak is looked for. If it isn't drift, "
         f"{_finest(density.provenance)}"
     )
     return (note,)

@@ -47,8 +47,8 @@ def tolerated(
         found = tuple(one.select(names) for one, names in zip(found, kept, strict=True) if names)
         if not found:
             raise EstimateError(
-                f"{log.path.name}: no channel is in {profile.unit}, as the profile is; units are {some_of(units)}: "
-                "give the channel's unit in a setup file (--setup), or the profile's (--unit)"
+                f"{log.path.name}: no channel is in {profile.unit}, as the profile is; units are {some_of(units)}. "
+                "Give the channel's unit in a setup file (--setup), or the profile's (--unit)"
             )
     try:
         return tuple(

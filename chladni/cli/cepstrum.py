@@ -7,7 +7,6 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number
 
 if TYPE_CHECKING:
@@ -39,11 +38,7 @@ def cepstrum(
     from chladni.apps.sources import Span
     from chladni.signals.study import Study
 
-    reads = [log, opener.setup]
-    require_places(
-        reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
-    )
-    out = Output(json, csv)
+    out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures, report=report)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = measure_cepstra(
             opened,
@@ -58,7 +53,7 @@ def cepstrum(
         _print_peaks(out, one)
     out.lines((*told, *found.notes))
     study = Study(title=log.name, cepstra=found.cepstra, findings=(*told, *found.notes))
-    out.csv(found.cepstra, reads=reads)
+    out.csv(found.cepstra)
     out.pictures(study, figures=figures, report=report)
     out.json(cepstrum_document(found))
 

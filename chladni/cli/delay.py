@@ -1,6 +1,5 @@
 """``chladni delay``: how much later motion arrives."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -8,7 +7,6 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number, with_error
 
 if TYPE_CHECKING:
@@ -54,8 +52,7 @@ def delay(
     from chladni.apps.findings import reading_sentences
     from chladni.apps.sources import Span
 
-    require_places(reads=[log, opener.setup], writes={"--json": json}, folders={"--figures": figures})
-    out = Output(json)
+    out = Output.of_log([log, opener.setup], json=json, figures=figures)
     with opener(log) as opened:
         found = log_delays(
             opened,
@@ -70,7 +67,9 @@ def delay(
     _print_delays(out, found)
     out.lines((*told, *found.notes))
     if figures is not None:
-        _save_figures(out, found, figures)
+        from chladni.viewers.figures.correlation import delay_figures
+
+        out.figures("delay", delay_figures(found), figures)
     out.json(delay_document(found))
 
 
@@ -88,11 +87,3 @@ def _print_delays(out: Output, found: "TimeDelays") -> None:
             for row, channel in enumerate(found.responses)
         ],
     )
-
-
-def _save_figures(out: Output, found: "TimeDelays", folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
-    from chladni.viewers.figures.correlation import delay_figures
-
-    for path in save_album(Album({"delay": delay_figures(found)}), folder):
-        out.line(f"figure: {path}")

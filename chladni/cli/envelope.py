@@ -7,7 +7,6 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number, with_error
 from chladni.signals.errors import SetupError
 from chladni.signals.text_reading import real_number
@@ -59,10 +58,7 @@ def envelope(
     from chladni.apps.sources import Span
     from chladni.signals.study import Study
 
-    require_places(
-        reads=[log, opener.setup], writes={"--json": json, "--report": report}, folders={"--figures": figures}
-    )
-    out = Output(json)
+    out = Output.of_log([log, opener.setup], json=json, figures=figures, report=report)
     geometry = None if bearing is None else _bearing(bearing)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = measure_envelopes(

@@ -7,7 +7,7 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_drawn, require_places
+from chladni.cli.places import require_drawn
 from chladni.cli.words import number, unit, with_error
 from chladni.signals.wording import counted
 
@@ -60,12 +60,8 @@ def frf(
     from chladni.spectral.bands import up_to
     from chladni.spectral.peaks import find_response_peaks
 
-    reads = [log, opener.setup]
-    require_places(
-        reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
-    )
+    out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures, report=report)
     require_drawn({"--db": db, "--log-frequency": log_frequency}, [figures, report])
-    out = Output(json, csv)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = transfer(
             opened,
@@ -85,7 +81,7 @@ def frf(
     findings = told + found.provenance.notes
     out.lines(findings)
     study = Study(title=log.name, response=found, response_peaks=peaks, geometry=geometry, findings=findings)
-    out.csv([found], reads=reads)
+    out.csv([found])
     out.pictures(study, figures=figures, report=report, decibels=db, log_frequency=log_frequency)
     out.json(frf_document(found, peaks))
 

@@ -71,13 +71,10 @@ def influence(
         listed = ", ".join(f"{pole.real:.4g} + {pole.imag:.4g}j" for pole in growing)
         to.lines([f"Warning: unstable, with poles at {listed} rad/s: what is told of final values is of no use"])
     if figures is not None:
-        from chladni.viewers.figures.album import Album
         from chladni.viewers.figures.influence import influence_figure
-        from chladni.viewers.figures.saving import save_album
 
         drawn = {"influence": influence_figure(table), "influence finite": influence_figure(table, of="finite")}
-        for path in save_album(Album({"influence": drawn}), figures):
-            to.line(f"figure: {path}")
+        to.figures("influence", drawn, figures)
     to.json(influence_document(table))
 
 

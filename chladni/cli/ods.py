@@ -1,6 +1,5 @@
 """``chladni ods``: how all points move together as the machine runs."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -8,7 +7,6 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
@@ -39,8 +37,7 @@ def ods(
     from chladni.apps.sources import Span
     from chladni.apps.spectra import Averaging, log_deflection
 
-    require_places(reads=[log, opener.setup], writes={"--json": json}, folders={"--figures": figures})
-    out = Output(json)
+    out = Output.of_log([log, opener.setup], json=json, figures=figures)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = log_deflection(
             opened,
@@ -55,7 +52,9 @@ def ods(
     _print_shapes(out, found)
     out.lines((*told, *found.provenance.notes))
     if figures is not None:
-        _save_figures(out, found, figures)
+        from chladni.viewers.figures.deflection import deflection_figures
+
+        out.figures("ods", deflection_figures(found), figures)
     out.json(deflection_document(found))
 
 
@@ -77,11 +76,3 @@ def _print_shapes(out: Output, found: "DeflectionShapes") -> None:
                 for column, channel in enumerate(found.channels)
             ],
         )
-
-
-def _save_figures(out: Output, found: "DeflectionShapes", folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
-    from chladni.viewers.figures.deflection import deflection_figures
-
-    for path in save_album(Album({"ods": deflection_figures(found)}), folder):
-        out.line(f"figure: {path}")

@@ -1,6 +1,5 @@
 """``chladni orders``: vibration in multiples of a shaft's speed."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -8,11 +7,9 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number, unit
 
 if TYPE_CHECKING:
-    from chladni.apps.orders import OrderStudy
     from chladni.signals.order_spectra import OrderCuts
 
 RPM = 60.0
@@ -75,8 +72,7 @@ def orders(
     from chladni.apps.orders import track_orders
     from chladni.apps.sources import Span
 
-    require_places(reads=[log, opener.setup], writes={"--json": json}, folders={"--figures": figures})
-    out = Output(json)
+    out = Output.of_log([log, opener.setup], json=json, figures=figures)
     shaft, telling = _telling(tacho=tacho, phase=phase, speed=speed, ridge=ridge)
     with opener(log) as opened:
         found = track_orders(
@@ -99,7 +95,9 @@ def orders(
         _print_cuts(out, cuts)
     out.lines((*told, *found.rotation.notes))
     if figures is not None:
-        _save_figures(out, found, figures)
+        from chladni.viewers.figures.orders import order_figures
+
+        out.figures("orders", order_figures(found.maps, found.cuts), figures)
     out.json(orders_document(found))
 
 
@@ -142,11 +140,3 @@ def _print_cuts(out: Output, cuts: "OrderCuts") -> None:
         ["channel", "order", "peak amplitude", "unit", "at [rpm]", "frequency [Hz]", "time [s]"],
         rows,
     )
-
-
-def _save_figures(out: Output, found: "OrderStudy", folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
-    from chladni.viewers.figures.orders import order_figures
-
-    for path in save_album(Album({"orders": order_figures(found.maps, found.cuts)}), folder):
-        out.line(f"figure: {path}")

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from rich import box
 from rich.console import Console
@@ -22,6 +22,8 @@ from chladni.signals.visible import visible, visible_json, visible_lines
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from chladni.signals.study import Study
     from chladni.signals.value import Value
 
@@ -67,7 +69,10 @@ def writing(stream: str) -> Iterator[None]:
 class Output:
     """Tables go to standard output, unless JSON or CSV was asked for there: then to standard error."""
 
-    def __init__(self, json_target: str | None = None, csv_target: str | None = None) -> None:
+    def __init__(
+        self, json_target: str | None = None, csv_target: str | None = None, *, reads: Sequence[Path | None] = ()
+    ) -> None:
+        self._reads = reads
         self.json_target = _told_target(json_target, "the document of --json")
         self.csv_target = _told_target(csv_target, "the table of --csv")
         if self.json_target == self.csv_target == "-":
@@ -76,6 +81,22 @@ class Output:
         if not self.console.is_terminal:
             # A pipe has no width of its own; rich's 80 would cut channel names in two.
             self.console.width = max(self.console.width, 160)
+
+    @classmethod
+    def of_log(
+        cls,
+        reads: Sequence[Path | None],
+        *,
+        json: str | None,
+        csv: str | None = None,
+        figures: Path | None,
+        report: Path | None = None,
+    ) -> Self:
+        """Give the output of a command that reads `reads`, once all that it will write is known to have its place."""
+        require_places(
+            reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
+        )
+        return cls(json, csv, reads=reads)
 
     def line(self, text: str = "", *, style: str = "") -> None:
         """Print one line, wrapped at the terminal's width."""
@@ -131,6 +152,13 @@ class Output:
             write_report(study, report, album=album)
             self.line(f"report: {report}")
 
+    def figures(self, command: str, drawn: "Mapping[str, Figure]", folder: Path) -> None:
+        """Save the figures of a command in a folder, and say where they are."""
+        from chladni.viewers.figures import Album, save_album
+
+        for path in save_album(Album({command: drawn}), folder):
+            self.line(f"figure: {path}")
+
     def json(self, content: Mapping[str, Any]) -> None:
         """Write `content` where ``--json`` said; nothing when it wasn't given."""
         if self.json_target is None:
@@ -144,17 +172,11 @@ class Output:
             return
         _send(encoded)
 
-    def csv(self, values: "Sequence[Value]", *, reads: Sequence[Path | None]) -> None:
+    def csv(self, values: "Sequence[Value]") -> None:
         """Write `values` where ``--csv`` said, and say so; nothing when it wasn't given.
 
-        A table has one axis. The second one goes beside the first, as ``psd_2.csv``, and so on.
-
-        Parameters
-        ----------
-        values
-            What makes tables.
-        reads
-            Files that the command reads, which aren't replaced.
+        A table has one axis. The second one goes beside the first, as ``psd_2.csv``, and so on. What the
+        command reads isn't replaced.
         """
         if self.csv_target is None:
             return
@@ -171,7 +193,7 @@ class Output:
             return
         paths = [target, *(target.with_stem(f"{target.stem}_{place}") for place in range(2, len(values) + 1))]
         beside = {f"table {place} of --csv": path for place, path in enumerate(paths, start=1)}
-        require_places(reads=reads, writes={"--json": self.json_target, **beside})
+        require_places(reads=self._reads, writes={"--json": self.json_target, **beside})
         for value, path in zip(values, paths, strict=True):
             value.to_csv(path)
             self.line(f"table: {path}")

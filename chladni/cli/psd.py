@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_drawn, require_places
+from chladni.cli.places import require_drawn
 from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
@@ -42,12 +42,8 @@ def psd(
     from chladni.signals.study import Study
     from chladni.spectral.bands import up_to
 
-    reads = [log, opener.setup]
-    require_places(
-        reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
-    )
+    out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures, report=report)
     require_drawn({"--db": db, "--log-frequency": log_frequency}, [figures, report])
-    out = Output(json, csv)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = densities(
             opened,
@@ -69,7 +65,7 @@ def psd(
     out.lines((*told, *notes))
     peaks = tuple(peak for group in named for peak in group.peaks)
     study = Study(title=log.name, densities=found, peaks=peaks, geometry=geometry, findings=told + notes)
-    out.csv(found, reads=reads)
+    out.csv(found)
     out.pictures(study, figures=figures, report=report, decibels=db, log_frequency=log_frequency)
     out.json(document)
 

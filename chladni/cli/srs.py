@@ -1,6 +1,5 @@
 """``chladni srs``: what a shock does to what it shakes."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -8,12 +7,9 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number, unit
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from chladni.signals.shock_response import ShockResponse
 
 
@@ -55,9 +51,7 @@ def srs(
     from chladni.apps.shock import shock_responses
     from chladni.apps.sources import Span
 
-    reads = [log, opener.setup]
-    require_places(reads=reads, writes={"--json": json, "--csv": csv}, folders={"--figures": figures})
-    out = Output(json, csv)
+    out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures)
     with opener(log) as opened:
         found = shock_responses(
             opened,
@@ -73,9 +67,11 @@ def srs(
     for one in found:
         _print_highest(out, one)
     out.lines((*told, *(note for one in found for note in one.notes)))
-    out.csv(found, reads=reads)
+    out.csv(found)
     if figures is not None:
-        _save_figures(out, found, figures)
+        from chladni.viewers.figures.shock import shock_figures
+
+        out.figures("srs", shock_figures(found), figures)
     out.json(shock_document(found))
 
 
@@ -98,11 +94,3 @@ def _print_highest(out: Output, found: "ShockResponse") -> None:
             for row in rows
         ],
     )
-
-
-def _save_figures(out: Output, found: "Sequence[ShockResponse]", folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
-    from chladni.viewers.figures.shock import shock_figures
-
-    for path in save_album(Album({"srs": shock_figures(found)}), folder):
-        out.line(f"figure: {path}")

@@ -8,7 +8,6 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number
 
 if TYPE_CHECKING:
@@ -48,8 +47,7 @@ def tolerance(
     from chladni.apps.tolerance import tolerated
     from chladni.spectral.random_vibration import random_profile
 
-    require_places(reads=[log, opener.setup], writes={"--json": json}, folders={"--figures": figures})
-    out = Output(json)
+    out = Output.of_log([log, opener.setup], json=json, figures=figures)
     profile = random_profile([*map(_point, breakpoints)], unit=unit, upper_db=upper, lower_db=lower)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = tolerated(
@@ -111,9 +109,7 @@ def _row(one: "Tolerated", row: int, factor: float, unit: str) -> list[str]:
 
 
 def _save_figures(out: Output, found: "Sequence[Tolerated]", unit: str, folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
     from chladni.viewers.figures.random_vibration import tolerance_figures
 
     drawn = tolerance_figures([one.density for one in found], found[0].check.profile, unit=unit)
-    for path in save_album(Album({"tolerance": drawn}), folder):
-        out.line(f"figure: {path}")
+    out.figures("tolerance", drawn, folder)

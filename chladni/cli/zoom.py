@@ -8,7 +8,6 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import number, unit
 
 if TYPE_CHECKING:
@@ -38,8 +37,7 @@ def zoom(
     from chladni.apps.sources import Span
     from chladni.apps.spectra import zoomed
 
-    require_places(reads=[log, opener.setup], writes={"--json": json}, folders={"--figures": figures})
-    out = Output(json)
+    out = Output.of_log([log, opener.setup], json=json, figures=figures)
     with opener(log) as opened:
         span = Span(start_s=start, end_s=end)
         found = zoomed(
@@ -72,10 +70,8 @@ def _print_highest(out: Output, found: "Sequence[AmplitudeSpectrum]") -> None:
 
 
 def _save_figures(out: Output, found: "Sequence[AmplitudeSpectrum]", folder: Path) -> None:
-    from chladni.viewers.figures import Album, save_album
     from chladni.viewers.figures.amplitude import amplitude_figures
 
     drawn = {f"zoom {place} {name}": figure for place, one in enumerate(found, start=1)
              for name, figure in amplitude_figures(one).items()}  # fmt: skip
-    for path in save_album(Album({"zoom": drawn}), folder):
-        out.line(f"figure: {path}")
+    out.figures("zoom", drawn, folder)

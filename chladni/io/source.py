@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from chladni.io.log import Log
 from chladni.io.log import open as open_log
-from chladni.signals.channel import Names, as_names, numbered
+from chladni.signals.channel import Names, as_names, numbered, require_channels
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -142,8 +142,10 @@ def series_of(
     ------
     LogError
         When the file can't be read, there is no such channel, or channels don't share a grid.
-    SetupError, EstimateError
+    SetupError
         See `log_or_series`.
+    EstimateError
+        Also when the series holds no channel.
 
     Examples
     --------
@@ -154,6 +156,7 @@ def series_of(
     if isinstance(found, Log):
         return found.read(None if channels is None else as_names(channels), start_s=start_s, end_s=end_s)
     chosen = found if channels is None else found.select(channels)
+    require_channels(chosen.channels)
     return chosen if start_s is None and end_s is None else chosen.window(start_s=start_s, end_s=end_s)
 
 

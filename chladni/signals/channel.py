@@ -93,6 +93,12 @@ def find_channels(channels: Sequence[Channel], names: Names, *, role: str = "cha
     return [rows[name] if name in rows else find_channel(channels, name, role=role) for name in as_names(names)]
 
 
+def require_channels(channels: Sequence[Channel]) -> None:
+    """Raise `EstimateError` when there is no channel to make an estimate of."""
+    if not channels:
+        raise EstimateError("the series holds no channel; select one at least")
+
+
 def numbered(prefix: str, count: int, names: Names | None = None) -> tuple[str, ...]:
     """Give names for so many channels: those given, else ``ch1``, ``ch2``, ... of the prefix ``ch``.
 

@@ -93,6 +93,7 @@ class AutoSpectra(Value):
 
     AXES: ClassVar = {"density": ("channels", "frequency_hz")}
     ROWS: ClassVar = "frequency_hz"
+    UNITS: ClassVar = {"density": power_density_unit}
 
     frequency_hz: Real
     density: Real
@@ -108,7 +109,3 @@ class AutoSpectra(Value):
         if self.noise_density is not None:
             require_shape("noise_density", self.noise_density, expected, "channels x frequencies")
         self._freeze()
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
-        """Give the unit of a density."""
-        return power_density_unit(self.channels[place[0]].unit)

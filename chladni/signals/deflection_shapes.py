@@ -9,7 +9,7 @@ from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.provenance import Provenance
-from chladni.signals.value import Value, require_shape
+from chladni.signals.value import Value, of_channel, require_shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,6 +43,7 @@ class DeflectionShapes(Value):
         "coherence": ("frequency_hz", "channels"),
     }
     ROWS: ClassVar = "frequency_hz"
+    UNITS: ClassVar = {"values": of_channel, "std": of_channel}
 
     frequency_hz: Real
     values: Complex
@@ -60,7 +61,3 @@ class DeflectionShapes(Value):
         for name in ("values", "std", "coherence"):
             require_shape(name, getattr(self, name), expected, "shapes x channels")
         self._freeze()
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:
-        """Give the unit of a channel's motion."""
-        return "" if field == "coherence" else self.channels[place[0]].unit

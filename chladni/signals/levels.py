@@ -9,7 +9,7 @@ import numpy as np
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel, find_channels
 from chladni.signals.provenance import Provenance
-from chladni.signals.value import Coordinate, Value, require_shape
+from chladni.signals.value import Coordinate, Value, of_channel, require_shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,6 +32,7 @@ class RunningLevels(Value):
 
     AXES: ClassVar = dict.fromkeys(("rms", "peak", "kurtosis"), ("channels", "bands_hz", "time_s"))
     ROWS: ClassVar = "time_s"
+    UNITS: ClassVar = {"rms": of_channel, "peak": of_channel}
 
     window_s: float
     time_s: Real
@@ -62,10 +63,6 @@ class RunningLevels(Value):
     def coordinate(self, axis: str) -> Coordinate:
         """Give what stands along an axis, bands as ``10 to 1000 Hz``."""
         return _band_names(self.bands_hz) if axis == "bands_hz" else super(RunningLevels, self).coordinate(axis)
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:
-        """Give the unit of a channel's levels; none of kurtosis."""
-        return "" if field == "kurtosis" else self.channels[place[0]].unit
 
 
 def _band_names(bands_hz: Sequence[tuple[float, float]]) -> list[str]:
@@ -263,6 +260,7 @@ class OctaveLevels(Value):
 
     AXES: ClassVar = {"rms": ("channels", "mid_hz"), "std": ("channels", "mid_hz")}
     ROWS: ClassVar = "mid_hz"
+    UNITS: ClassVar = dict.fromkeys(AXES, of_channel)
 
     fraction: int
     weighting: str | None
@@ -291,10 +289,6 @@ class OctaveLevels(Value):
     def std(self) -> Real:
         """``[channel, band]``, one sigma of it."""
         return self.bands.std
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
-        """Give the unit of a channel."""
-        return self.channels[place[0]].unit
 
     def decibels(self) -> Real:
         """Give ``[channel, band]`` in dB over the references of ISO 1683, such as 20 uPa and 1 um/s^2."""

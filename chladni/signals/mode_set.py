@@ -195,7 +195,7 @@ def _by_mode(shapes: Complex, count: int, rows: Rows | None) -> Complex:
         raise EstimateError(f"shapes have shape {shapes.shape}, but must be [mode, channel] of {count} modes")
     if rows is None and shapes.shape[0] == shapes.shape[1] > 1:
         raise EstimateError(
-            f'shapes are {count} x {count}, so either axis may be the modes; say rows="modes" where a row is a mode, '
+            f'shapes are {count} x {count}, so either axis may be the modes. Say rows="modes" where a row is a mode, '
             'or rows="channels" where a column is one'
         )
     turned = rows == "channels" or (rows is None and shapes.shape[0] != count)

@@ -8,7 +8,7 @@ import numpy as np
 from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
-from chladni.signals.value import Value, require_shape
+from chladni.signals.value import Value, of_channel, require_shape
 
 OrderMethod = Literal["angle", "vold-kalman"]
 
@@ -40,6 +40,7 @@ class OrderMap(Value):
 
     AXES: ClassVar = {"values": ("channels", "time_s", "order"), "speed_hz": ("time_s",)}
     ROWS: ClassVar = "time_s"
+    UNITS: ClassVar = {"values": of_channel, "speed_hz": "Hz"}
 
     order: Real
     time_s: Real
@@ -57,10 +58,6 @@ class OrderMap(Value):
         expected = (len(self.channels), self.time_s.size, self.order.size)
         require_shape("values", self.values, expected, "channels x slices x orders")
         self._freeze()
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:
-        """Give the unit of a channel's amplitudes, or of the speed."""
-        return self.channels[place[0]].unit if field == "values" else "Hz"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,6 +87,7 @@ class OrderCuts(Value):
 
     AXES: ClassVar = {"values": ("channels", "orders", "time_s"), "speed_hz": ("time_s",)}
     ROWS: ClassVar = "time_s"
+    UNITS: ClassVar = {"values": of_channel, "speed_hz": "Hz"}
 
     orders: Real
     time_s: Real
@@ -105,7 +103,3 @@ class OrderCuts(Value):
         expected = (len(self.channels), self.orders.size, self.time_s.size)
         require_shape("values", self.values, expected, "channels x orders x points")
         self._freeze()
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:
-        """Give the unit of a channel's amplitudes, or of the speed."""
-        return self.channels[place[0]].unit if field == "values" else "Hz"

@@ -38,6 +38,7 @@ class PowerSpectralDensity(Value):
 
     AXES: ClassVar = {"values": ("channels", "frequency_hz"), "std": ("channels", "frequency_hz")}
     ROWS: ClassVar = "frequency_hz"
+    UNITS: ClassVar = dict.fromkeys(AXES, power_density_unit)
 
     frequency_hz: Real
     values: Real
@@ -116,10 +117,6 @@ class PowerSpectralDensity(Value):
     def units(self) -> tuple[str, ...]:
         """Unit of each row, such as ``(m/s^2)^2/Hz``."""
         return tuple(power_density_unit(channel.unit) for channel in self.channels)
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
-        """Give the unit of a density."""
-        return self.units[place[0]]
 
     def select(self, names: Names) -> Self:
         """Give the densities of the named channels; `EstimateError` naming those there are when one is missing."""

@@ -9,7 +9,7 @@ from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.units import power_density_unit
-from chladni.signals.value import Value, require_frequency_axis, require_shape
+from chladni.signals.value import Value, of_channel, require_frequency_axis, require_shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,6 +102,7 @@ class ProfileCheck(Value):
 
     AXES: ClassVar = {"deviation_db": ("channels", "frequency_hz")}
     ROWS: ClassVar = "frequency_hz"
+    UNITS: ClassVar = {"deviation_db": "dB"}
 
     frequency_hz: Real
     deviation_db: Real
@@ -119,10 +120,6 @@ class ProfileCheck(Value):
         for name in ("outside", "rms", "std_db"):
             require_shape(name, getattr(self, name), expected[:1], "channels")
         self._freeze()
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
-        """Give the unit of the deviations."""
-        return "dB"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -195,6 +192,7 @@ class VibrationResponse(Value):
         "miles": ("channels", "frequency_hz"),
     }
     ROWS: ClassVar = "frequency_hz"
+    UNITS: ClassVar = dict.fromkeys(AXES, of_channel)
 
     frequency_hz: Real
     rms: Real
@@ -211,7 +209,3 @@ class VibrationResponse(Value):
         for name in ("rms", "miles", "peak"):
             require_shape(name, getattr(self, name), expected, "channels x frequencies")
         self._freeze()
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
-        """Give the unit of a channel's response."""
-        return self.channels[place[0]].unit

@@ -8,7 +8,7 @@ import numpy as np
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
-from chladni.signals.value import Value, require_frequency_axis, require_shape
+from chladni.signals.value import Value, of_channel, require_frequency_axis, require_shape
 
 ShockQuantity = Literal["absolute-acceleration", "relative-displacement", "pseudo-velocity"]
 
@@ -41,6 +41,7 @@ class ShockResponse(Value):
         "negative": ("channels", "frequency_hz"),
     }
     ROWS: ClassVar = "frequency_hz"
+    UNITS: ClassVar = dict.fromkeys(AXES, of_channel)
 
     frequency_hz: Real
     positive: Real
@@ -60,10 +61,6 @@ class ShockResponse(Value):
         require_shape("negative", self.negative, expected, "channels x frequencies")
         require_shape("offset", self.offset, expected[:1], "channels")
         self._freeze()
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
-        """Give the unit of a channel's response."""
-        return self.channels[place[0]].unit
 
     @property
     def maximax(self) -> Real:

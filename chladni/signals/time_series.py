@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.channel import UNKNOWN, Channel, Names, Units, as_names, find_channel, made_channels, numbered
 from chladni.signals.errors import EstimateError
-from chladni.signals.value import Coordinate, Value, require_shape
+from chladni.signals.value import Coordinate, Value, of_channel, require_shape
 from chladni.signals.wording import counted
 
 NS_PER_S = 1_000_000_000
@@ -64,6 +64,7 @@ class TimeSeries(Value):
 
     AXES: ClassVar = {"values": ("channels", "time_s")}
     ROWS: ClassVar = "time_s"
+    UNITS: ClassVar = {"values": of_channel}
 
     values: NDArray[np.floating]
     sample_rate_hz: float
@@ -169,10 +170,6 @@ class TimeSeries(Value):
     def coordinate(self, axis: str) -> Coordinate:
         """Give the seconds since the first sample, or the names of the channels."""
         return self.times_s() if axis == "time_s" else Value.coordinate(self, axis)
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
-        """Give the unit of a channel."""
-        return self.channels[place[0]].unit
 
     def times_s(self) -> Real:
         """Seconds of each sample since the first, computed from the index so that no error adds up."""

@@ -1,7 +1,7 @@
 """What all value records share: arrays that can't be written to, and loud refusal of bare NumPy arithmetic."""
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
@@ -28,6 +28,11 @@ def read_only(array: NDArray[ScalarT]) -> NDArray[ScalarT]:
     view = array.view()
     view.flags.writeable = False
     return view
+
+
+def of_channel(unit: str) -> str:
+    """Give the unit of a channel as that of its values, see `Value.UNITS`."""
+    return unit
 
 
 class Drawn:
@@ -74,12 +79,15 @@ class Value(Drawn):
         Of the fields that make a table, the main one first: what each of their axes runs along, see `coordinate`.
     ROWS
         Which of these axes runs down the rows of a table.
+    UNITS
+        Of these fields, the unit, or what makes it of the unit of a channel on the first axis but `ROWS`.
     """
 
     __slots__ = ()
     __array_ufunc__: Any = None
     AXES: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     ROWS: ClassVar[str] = ""
+    UNITS: ClassVar[Mapping[str, str | Callable[[str], str]]] = {}
 
     def coordinate(self, axis: str) -> Coordinate:
         """Give what stands along one axis of `AXES`: the numbers of that field, or the names of its channels."""
@@ -87,9 +95,13 @@ class Value(Drawn):
         # Channels know their names; this floor's records of them are above this module.
         return along if isinstance(along, np.ndarray) else [getattr(one, "name", one) for one in along]
 
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002  # for those who know
+    def unit_at(self, field: str, place: tuple[int, ...]) -> str:
         """Give the unit of a field of `AXES` at a place along its axes but `ROWS`; empty where it has none."""
-        return ""
+        unit = self.UNITS.get(field, "")
+        if isinstance(unit, str):
+            return unit
+        channels = next(one for one in self.AXES[field] if one != self.ROWS)
+        return unit(getattr(self, channels)[place[0]].unit)
 
     def to_pandas(self) -> "pd.DataFrame":
         """Give it as a data frame: a row for each frequency, moment or mode, a column for each channel.

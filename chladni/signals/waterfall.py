@@ -38,6 +38,7 @@ class Waterfall(Value):
 
     AXES: ClassVar = {"values": ("channels", "time_s", "frequency_hz")}
     ROWS: ClassVar = "time_s"
+    UNITS: ClassVar = {"values": power_density_unit}
 
     time_s: Real
     frequency_hz: Real
@@ -54,7 +55,3 @@ class Waterfall(Value):
         expected = (len(self.channels), self.time_s.size, self.frequency_hz.size)
         require_shape("values", self.values, expected, "channels x times x frequencies")
         self._freeze()
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
-        """Give the unit of a channel's densities."""
-        return power_density_unit(self.channels[place[0]].unit)

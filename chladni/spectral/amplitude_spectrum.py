@@ -12,7 +12,7 @@ from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import SetupError
 from chladni.signals.provenance import Provenance
 from chladni.signals.renamed import renamed
-from chladni.signals.value import Value, require_frequency_axis, require_shape
+from chladni.signals.value import Value, of_channel, require_frequency_axis, require_shape
 from chladni.spectral.cross_spectra import spectra_of
 from chladni.spectral.power_spectral_density import power_spectral_density
 from chladni.spectral.windows import Window
@@ -44,6 +44,7 @@ class AmplitudeSpectrum(Value):
 
     AXES: ClassVar = {"values": ("channels", "frequency_hz"), "std": ("channels", "frequency_hz")}
     ROWS: ClassVar = "frequency_hz"
+    UNITS: ClassVar = dict.fromkeys(AXES, of_channel)
 
     frequency_hz: Real
     values: Real
@@ -58,10 +59,6 @@ class AmplitudeSpectrum(Value):
         require_shape("values", self.values, expected, "channels x frequencies")
         require_shape("std", self.std, expected, "channels x frequencies")
         self._freeze()
-
-    def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
-        """Give the unit of a channel."""
-        return self.channels[place[0]].unit
 
 
 @renamed(spectra="source")

@@ -117,8 +117,8 @@ class BandFilter:
         if self._runs.longest <= 2 * self._reach:
             raise EstimateError(
                 f"a band from {self.band_hz[0]:g} to {self.band_hz[1]:g} Hz needs an unbroken run of "
-                f"{2 * self.reach_s:.3g} s, and the longest has {self._runs.longest / self.sample_rate_hz:.3g} s; "
-                "measure longer, or begin the band at a higher frequency"
+                f"{2 * self.reach_s:.3g} s, and the longest has {self._runs.longest / self.sample_rate_hz:.3g} s. "
+                "Measure longer, or begin the band at a higher frequency"
             )
 
     def _filtered(self) -> Iterator[TimeSeries]:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 from itertools import chain
 
+from chladni.signals.channel import require_channels
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 
@@ -17,7 +18,7 @@ def leading_part(source: Source, samples: int) -> tuple[tuple[TimeSeries, ...], 
     Raises
     ------
     EstimateError
-        When the source holds no sample.
+        When the source holds no sample or no channel.
     """
     blocks = iter((source,) if isinstance(source, TimeSeries) else source)
     lead: list[TimeSeries] = []
@@ -30,6 +31,7 @@ def leading_part(source: Source, samples: int) -> tuple[tuple[TimeSeries, ...], 
             break
     if length == 0:
         raise EstimateError("there is no sample to average; choose a time window in which the log has data")
+    require_channels(lead[0].channels)
     return tuple(lead), chain(lead, blocks)
 
 

@@ -303,8 +303,8 @@ def _fitted(
 
 def _misfits(correlation: CrossCorrelation, found: Sequence[_Delay]) -> list[str]:
     return [
-        f"{channel.name}: phases lie {one.misfit:.2g} times as far off a pure delay as scatter explains, so the "
-        "error bar is as much wider; there are resonances or several paths: choose a band without"
+        f"{channel.name}: phases lie {one.misfit:.2g} times as far off a pure delay as scatter explains. The error "
+        "bar is as much wider. There are resonances or several paths: choose a band without"
         for channel, one in zip(correlation.responses, found, strict=True)
         if one.misfit
     ]

@@ -155,11 +155,9 @@ def require_measured(series: TimeSeries) -> Mask:
     Raises
     ------
     EstimateError
-        When there is no channel, nothing was measured of one, or its values are too large or too small to be squared.
+        When nothing was measured of a channel, or its values are too large or too small to be squared.
     """
     measured = measured_samples(series)
-    if not series.channels:
-        raise EstimateError("the series holds no channel; select one at least")
     if empty := [channel.name for channel, row in zip(series.channels, measured, strict=True) if not row.any()]:
         raise EstimateError(f"{', '.join(empty)}: nothing was measured; leave it out")
     largest = np.max(np.abs(series.values), axis=1, initial=0.0, where=measured)

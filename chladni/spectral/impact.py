@@ -231,7 +231,7 @@ def _average(
 def _why_none(impacts: Impacts) -> str:
     if impacts.record_s > impacts.longest_s:
         return (
-            f": records of {impacts.record_s:.3g} s are longer than the {impacts.longest_s:.3g} s between hits; ask "
+            f": records of {impacts.record_s:.3g} s are longer than the {impacts.longest_s:.3g} s between hits. Ask "
             f"for a resolution of {rounded_up(1 / impacts.longest_s)} Hz or coarser, or hit at longer intervals"
         )
     reasons = "; ".join(f"record {r.record}: {r.reason}" for r in impacts.rejected) or "no hit was found"
@@ -320,7 +320,7 @@ def _still_ringing(series: TimeSeries, impacts: Impacts, decay_per_s: float) -> 
     else:
         longer = "hit at longer intervals"
     note = (
-        f"{', '.join(names)}: not died away at the end of the record, which smears peaks; {longer}, or give "
-        f"impact_cross_spectra an exponential window of {advised:.3g}/s (1 % at the end) in Python"
+        f"{', '.join(names)}: not died away at the end of the record, which smears peaks. Remedy: {longer}, or in "
+        f"Python give impact_cross_spectra an exponential window of {advised:.3g}/s (1 % at the end)"
     )
     return [note]

@@ -196,7 +196,7 @@ class LevelsAccumulator:
 def _edge_note(one: BandFilter) -> str:
     return (
         f"band {one.band_hz[0]:g} to {one.band_hz[1]:g} Hz: the first and last {one.reach_s:.3g} s of each unbroken "
-        "run are not judged, since the filter leans on what is outside"
+        "run are not judged. The filter leans on what is outside"
     )
 
 

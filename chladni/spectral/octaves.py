@@ -326,7 +326,7 @@ def _class_note(bands: tuple[OctaveBand, ...], spacing_hz: float, window: Real) 
     met = f"from the {fitting.nominal_hz:g} Hz band on" if fitting else "in none of these bands"
     return (
         f"{name_of(bands[0].fraction)} bands summed from spectral lines: no filter, so no class of IEC 61260-1 "
-        f"applies; steady tones are weighted as the class 1 mask asks {met}"
+        f"applies. Steady tones are weighted as the class 1 mask asks {met}"
     )
 
 

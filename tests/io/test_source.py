@@ -1,5 +1,6 @@
 """Every verb on samples takes a log, its path, a series, and an array with its sample rate, and answers the same."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -37,6 +38,16 @@ VERBS = {
     "time_delay": partial(chladni.time_delay, references="x"),
     "zoom_spectrum": partial(chladni.zoom_spectrum, band_hz=(50.0, 70.0)),
     "probability_density": chladni.probability_density,
+    "levels": chladni.levels,
+    "cepstrum": chladni.cepstrum,
+    "kurtogram": chladni.kurtogram,
+}
+# Motions alone, densities too, or a value for each channel.
+OF_THEIR_KIND = {
+    "integrate": partial(chladni.integrate, low_hz=5.0),
+    "differentiate": partial(chladni.differentiate, high_hz=50.0),
+    "octaves": chladni.octaves,
+    "envelope": partial(chladni.envelope, band_hz=(50.0, 70.0)),
 }
 
 
@@ -83,6 +94,19 @@ def test_an_array_without_rate_is_refused_and_a_series_with_one_too(verb):
 def test_what_holds_no_samples_is_refused_by_its_name(verb):
     with pytest.raises(chladni.SetupError, match="a PowerSpectralDensity holds no samples over time"):
         verb(chladni.psd(series()))
+
+
+@pytest.mark.parametrize("verb", [*VERBS.values(), *OF_THEIR_KIND.values()], ids=[*VERBS, *OF_THEIR_KIND])
+def test_a_series_without_channels_is_refused(verb):
+    nothing = replace(series(), values=np.empty((0, 8192)), channels=())
+    with pytest.raises(chladni.EstimateError, match="no channel"):
+        verb(nothing)
+
+
+def test_blocks_without_channels_are_refused():
+    nothing = replace(series(), values=np.empty((0, 8192)), channels=())
+    with pytest.raises(chladni.EstimateError, match="holds no channel"):
+        chladni.cross_spectra(iter([nothing]))
 
 
 def test_part_of_an_array_is_that_part_of_its_series():

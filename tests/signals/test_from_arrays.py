@@ -128,7 +128,7 @@ def test_modes_are_sorted_and_scaled_whichever_axis_they_run_along(shapes, rows)
 
 def test_a_square_array_of_shapes_is_refused_until_its_rows_are_told():
     square = [[1.0, 0.5], [-0.25, 1.0]]
-    with pytest.raises(EstimateError, match="either axis may be the modes; say rows="):
+    with pytest.raises(EstimateError, match=r"either axis may be the modes\. Say rows="):
         ModeSet.from_arrays([1.0, 2.0], square)
     turned = ModeSet.from_arrays([1.0, 2.0], square, rows="channels", damping_ratio=0.01)
     np.testing.assert_allclose(turned.shapes, [[1.0, -0.25], [0.5, 1.0]], rtol=1e-15)

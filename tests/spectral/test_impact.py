@@ -197,7 +197,7 @@ def test_records_longer_than_the_time_between_hits_are_told_with_the_longest():
     log = hammer_log(pulses(10, FIVE))
     impacts = find_impacts(log, force="/hammer", record_s=2.5)
     assert impacts.longest_s == pytest.approx(1.9, abs=0.1)
-    with pytest.raises(EstimateError, match=r"records of 2.5 s are longer .* ask for a resolution of") as told:
+    with pytest.raises(EstimateError, match=r"records of 2.5 s are longer .* Ask for a resolution of") as told:
         impact_cross_spectra(log, impacts)
     asked_hz = float(str(told.value).split("a resolution of ")[1].split(" Hz")[0])
     followed = impact_cross_spectra(log, find_impacts(log, force="/hammer", record_s=1 / asked_hz))

@@ -15,6 +15,7 @@ from chladni.models.core.reading import Chart, InfluenceTable, InstrumentReading
 from chladni.models.core.simulation import Simulation
 from chladni.signals.arrays import Real
 from chladni.signals.cepstrum import Cepstrum
+from chladni.signals.channel import Channel
 from chladni.signals.coherence import Coherence
 from chladni.signals.cross_correlation import CrossCorrelation, TimeDelays
 from chladni.signals.deflection_shapes import DeflectionShapes
@@ -135,25 +136,32 @@ def pictures(value: object) -> list[Picture]:
     raise SetupError(f"a {type(value).__name__} has no picture; take its fields")
 
 
+def _of_groups(
+    channels: Sequence[Channel], height_in: float, draw: Callable[..., object], x_label: str
+) -> list[Picture]:
+    """Give a picture for each group of channels of one unit."""
+    return [Picture((Part(height_in, partial(draw, group=group)),), x_label) for group in groups(channels)]
+
+
+def _of_rows(
+    channels: Sequence[Channel], height_in: float, draw: Callable[..., object], x_label: str
+) -> list[Picture]:
+    """Give a picture for each channel."""
+    return [Picture((Part(height_in, partial(draw, row=row)),), x_label) for row in range(len(channels))]
+
+
 @pictures.register
 def _(value: TimeSeries) -> list[Picture]:
     style = Style.of_channels(value.channels)
-    return [
-        Picture((Part(LINES_IN, partial(_draw_waveforms, series=value, group=group, style=style)),), "Time [s]")
-        for group in groups(value.channels)
-    ]
+    draw = partial(_draw_waveforms, series=value, style=style)
+    return _of_groups(value.channels, LINES_IN, draw, "Time [s]")
 
 
 @pictures.register
 def _(value: PowerSpectralDensity) -> list[Picture]:
     style = Style.of_channels(value.channels)
-    return [
-        Picture(
-            (Part(density.HEIGHT_IN, partial(density.draw_densities, density=value, group=group, style=style)),),
-            "Frequency [Hz]",
-        )
-        for group in groups(value.channels)
-    ]
+    draw = partial(density.draw_densities, density=value, style=style)
+    return _of_groups(value.channels, density.HEIGHT_IN, draw, "Frequency [Hz]")
 
 
 @pictures.register
@@ -199,29 +207,15 @@ def _(value: Levels) -> list[Picture]:
 @pictures.register
 def _(value: Severity) -> list[Picture]:
     style = Style.of_channels(value.channels, origin_ns=value.running.start_time_ns)
-    return [
-        Picture(
-            (
-                Part(
-                    levels.SEVERITY_HEIGHT_IN, partial(levels.draw_severity, severity=value, group=group, style=style)
-                ),
-            ),
-            levels.severity_label(value),
-        )
-        for group in groups(value.channels)
-    ]
+    draw = partial(levels.draw_severity, severity=value, style=style)
+    return _of_groups(value.channels, levels.SEVERITY_HEIGHT_IN, draw, levels.severity_label(value))
 
 
 @pictures.register
 def _(value: OctaveLevels) -> list[Picture]:
     style = Style.of_channels(value.channels)
-    return [
-        Picture(
-            (Part(octaves.HEIGHT_IN, partial(octaves.draw_octaves, found=value, group=group, style=style)),),
-            octaves.octaves_label(value),
-        )
-        for group in groups(value.channels)
-    ]
+    draw = partial(octaves.draw_octaves, found=value, style=style)
+    return _of_groups(value.channels, octaves.HEIGHT_IN, draw, octaves.octaves_label(value))
 
 
 @pictures.register
@@ -234,13 +228,8 @@ def _(value: EnvelopeSpectrum) -> list[Picture]:
 @pictures.register
 def _(value: Cepstrum) -> list[Picture]:
     style = Style.of_channels(value.channels)
-    return [
-        Picture(
-            (Part(cepstrum.HEIGHT_IN, partial(cepstrum.draw_cepstrum, found=value, row=row, style=style)),),
-            cepstrum.X_LABEL,
-        )
-        for row in range(len(value.channels))
-    ]
+    draw = partial(cepstrum.draw_cepstrum, found=value, style=style)
+    return _of_rows(value.channels, cepstrum.HEIGHT_IN, draw, cepstrum.X_LABEL)
 
 
 @pictures.register
@@ -257,10 +246,8 @@ def _(value: Kurtogram) -> list[Picture]:
 @pictures.register
 def _(value: Waterfall) -> list[Picture]:
     style = Style.of_channels(value.channels, origin_ns=value.start_time_ns)
-    return [
-        Picture((Part(LINES_IN, partial(_draw_waterfall, fall=value, row=row, style=style)),), "Time [s]")
-        for row in range(len(value.channels))
-    ]
+    draw = partial(_draw_waterfall, fall=value, style=style)
+    return _of_rows(value.channels, LINES_IN, draw, "Time [s]")
 
 
 @pictures.register
@@ -294,13 +281,8 @@ def _(value: FilteredSeries) -> list[Picture]:
 @pictures.register
 def _(value: ShockResponse) -> list[Picture]:
     style = Style.of_channels(value.channels)
-    return [
-        Picture(
-            (Part(shock.HEIGHT_IN, partial(shock.draw_shock, response=value, group=group, style=style)),),
-            shock.X_LABEL,
-        )
-        for group in groups(value.channels)
-    ]
+    draw = partial(shock.draw_shock, response=value, style=style)
+    return _of_groups(value.channels, shock.HEIGHT_IN, draw, shock.X_LABEL)
 
 
 @pictures.register
@@ -363,10 +345,7 @@ def _(value: DeflectionShapes) -> list[Picture]:
 def _(value: AmplitudeSpectrum) -> list[Picture]:
     style = Style.of_channels(value.channels)
     draw = partial(amplitude.draw_amplitudes, found=value, style=style)
-    return [
-        Picture((Part(amplitude.HEIGHT_IN, partial(draw, group=group)),), "Frequency [Hz]")
-        for group in groups(value.channels)
-    ]
+    return _of_groups(value.channels, amplitude.HEIGHT_IN, draw, "Frequency [Hz]")
 
 
 @pictures.register
@@ -380,10 +359,7 @@ def _(value: ProbabilityDensity) -> list[Picture]:
 def _(value: VibrationResponse) -> list[Picture]:
     style = Style.of_channels(value.channels)
     draw = partial(random_vibration.draw_vibration_response, found=value, style=style)
-    return [
-        Picture((Part(random_vibration.HEIGHT_IN, partial(draw, group=group)),), "Natural frequency [Hz]")
-        for group in groups(value.channels)
-    ]
+    return _of_groups(value.channels, random_vibration.HEIGHT_IN, draw, "Natural frequency [Hz]")
 
 
 @pictures.register
