@@ -297,7 +297,7 @@ def _told(best: Fit, place: int) -> Mask:
     term = best.terms[place]
     moved = values - term.nominal
     inside = (moved > term.least + 1e-3 * term.scale) | ((term.nominal > 0) & (term.least == -term.nominal))
-    return (np.abs(moved) > _SIGMAS * deviations) & inside
+    return np.asarray((np.abs(moved) > _SIGMAS * deviations) & inside)
 
 
 def _candidate(solved: Solved, place: int) -> Candidate:
