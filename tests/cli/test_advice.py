@@ -11,7 +11,7 @@ from chladni.signals.time_series import TimeSeries
 from tests.modal import truth
 from tests.spectral.test_impact import FIVE, hammer_log, pulses
 
-ASKED = re.compile(r"ask for (?:a resolution of )?([0-9.e+-]+) Hz")
+ASKED = re.compile(r"[Aa]sk for (?:a resolution of )?([0-9.e+-]+) Hz")
 # What can't be had by an option is asked of the next measurement.
 MEASURE = re.compile(r"record.*times as long|records of .* s help|measure longer|average longer|take more hits")
 FORCE = truth.FORCE.format(0)
