@@ -52,6 +52,8 @@ _HOME = {
     "open_log": "chladni.io.log",
     "write_mcap": "chladni.io.mcap.writer",
     "load_setup": "chladni.io.setup",
+    "StudyResults": "chladni.io.study.results",
+    "results": "chladni.io.study.results",
     "DeflectionShape": "chladni.modal.checks.deflection_shapes",
     "deflection_shape": "chladni.modal.checks.deflection_shapes",
     "phase_referenced_shape": "chladni.modal.checks.deflection_shapes",
@@ -276,6 +278,7 @@ __all__ = [
     "StructureModel",
     "StructureOutput",
     "Study",
+    "StudyResults",
     "Terminal",
     "TimeDelays",
     "TimeSeries",
@@ -358,6 +361,7 @@ __all__ = [
     "random_profile",
     "read_uff_modes",
     "relative_motion",
+    "results",
     "robot_arm",
     "rotation",
     "roving_hammer",
@@ -416,6 +420,7 @@ if TYPE_CHECKING:
     from chladni.io.log import Log, open, open_log  # noqa: A004  # as chladni.open
     from chladni.io.mcap.writer import write_mcap
     from chladni.io.setup import load_setup
+    from chladni.io.study.results import StudyResults, results
     from chladni.modal.checks.deflection_shapes import DeflectionShape, deflection_shape, phase_referenced_shape
     from chladni.modal.checks.driving_point import check_driving_point
     from chladni.modal.checks.linearity import check_linearity

@@ -32,8 +32,10 @@ from chladni.cli.ods import ods
 from chladni.cli.options import Command
 from chladni.cli.orders import orders
 from chladni.cli.psd import psd
+from chladni.cli.query import query
 from chladni.cli.simulate import simulate
 from chladni.cli.srs import srs
+from chladni.cli.study import study
 from chladni.cli.tolerance import tolerance
 from chladni.cli.view import view
 from chladni.cli.zoom import zoom
@@ -69,6 +71,8 @@ for command in (
     zoom,
     view,
     compare,
+    study,
+    query,
     convert,
     simulate,
     influence,

@@ -1,6 +1,5 @@
 """Where a command's words go: a table for people, JSON for programs, progress while one waits."""
 
-import json
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +17,7 @@ from rich.text import Text
 from chladni.cli.places import require_places
 from chladni.io.atomic import Place, atomic_write
 from chladni.signals.errors import LogError, SetupError
-from chladni.signals.visible import visible, visible_json, visible_lines
+from chladni.signals.visible import document_text, visible, visible_lines
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
@@ -163,9 +162,8 @@ class Output:
         """Write `content` where ``--json`` said; nothing when it wasn't given."""
         if self.json_target is None:
             return
-        document = visible_json(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)) + "\n"
         # UTF-8, whatever the terminal's encoding.
-        encoded = document.encode()
+        encoded = document_text(content).encode()
         if self.json_target != "-":
             with atomic_write(self.json_target) as file:
                 file.write(encoded)

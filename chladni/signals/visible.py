@@ -5,8 +5,10 @@ may hold what a terminal obeys (escape sequences), what forges a line (line feed
 direction, characters without width). They are shown as Python writes them in a string: ``\x1b``, ``\n``, ``\u202e``.
 """
 
+import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 # Letters, marks and signs that Python can print, but that are drawn as nothing: Unicode's
 # Default_Ignorable_Code_Point (DerivedCoreProperties.txt) without the two selectors that tell an emoji's looks.
@@ -64,6 +66,17 @@ def visible_json(document: str) -> str:
     '{"a": "\\u202eω"}'
     """
     return _MAY_BE_ODD.sub(lambda found: found[0] if found[0] == "\n" else _in_json(found[0]), document)
+
+
+def document_text(content: Mapping[str, Any]) -> str:
+    r"""Write a document as ``--json`` gives it.
+
+    Examples
+    --------
+    >>> document_text({"format": "chladni.info/1"})
+    '{\n "format": "chladni.info/1"\n}\n'
+    """
+    return visible_json(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)) + "\n"
 
 
 def as_meant(text: str) -> str:

@@ -1,0 +1,151 @@
+"""A study: a recipe over many logs on a cluster, to a folder of tables."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from chladni.apps.study.engine import Answer, Engine
+from chladni.apps.study.work import Task, work_on
+from chladni.io.study.folder import StudyFolder, opened_folder
+from chladni.io.study.logs import LogAddress, find_logs
+from chladni.io.study.recipe import Recipe
+from chladni.io.study.tables import packed, tables_of
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Progress = Callable[[float], None]
+#: Between two times that what is done is put into the tables, at least.
+SETTLE_EVERY_S: Final = 30.0
+
+
+@dataclass(slots=True, kw_only=True)
+class StudyReport:
+    """What a run did.
+
+    Attributes
+    ----------
+    logs
+        That were asked for.
+    there
+        Whose rows were there already.
+    done
+        Whose rows were made now.
+    unchanged
+        That were read, and found to be what was done already.
+    failures
+        ``(log, step, reason)`` of what went wrong now.
+    seconds, cpu_s
+        Spent on logs by all workers together.
+    """
+
+    logs: int
+    there: int
+    done: int = 0
+    unchanged: int = 0
+    failures: list[tuple[str, str, str]] = field(default_factory=list)
+    seconds: float = 0.0
+    cpu_s: float = 0.0
+
+
+def run_study(
+    recipe: Recipe,
+    logs: Sequence[str] | Sequence[LogAddress],
+    out: Path | str,
+    *,
+    client: "Client",
+    progress: Progress = lambda _share: None,
+) -> StudyReport:
+    """Do what a recipe says with each log whose rows aren't there yet.
+
+    Parameters
+    ----------
+    recipe
+        From `chladni.io.study.recipe.load_recipe`.
+    logs
+        Files, folders and addresses, see `chladni.io.study.logs.find_logs`, or what that found.
+    out
+        Folder of the results; made, or gone on with.
+    client
+        See `chladni.apps.study.cluster.cluster`.
+    progress
+        Called with the share done, 0 to 1.
+
+    Raises
+    ------
+    SetupError
+        When the folder holds another study, the cluster goes away, or there is no log.
+    LogError
+        When the folder can't be written to. What is done stays.
+    """
+    found = [one if isinstance(one, LogAddress) else None for one in logs]
+    addresses = find_logs([str(one) for one in logs]) if None in found else tuple(one for one in found if one)
+    text = recipe.to_json()
+    with opened_folder(Path(out), recipe.identity, text) as folder:
+        waiting = [one for one in addresses if not _is_done(folder, one)]
+        report = StudyReport(logs=len(addresses), there=len(addresses) - len(waiting))
+        if waiting:
+            _run(Engine(client, partial(work_on, text)), folder, waiting, report, progress)
+        folder.settle()
+    return report
+
+
+def _is_done(folder: StudyFolder, address: LogAddress) -> bool:
+    done = folder.done.get(address.told)
+    return done is not None and bool(address.stamp) and done.stamp == address.stamp
+
+
+def _run(
+    engine: Engine[Task], folder: StudyFolder, waiting: Sequence[LogAddress], report: StudyReport, progress: Progress
+) -> None:
+    stamps = {one.url: one for one in waiting}
+    for place, answer in enumerate(_answers(engine, folder, waiting), 1):
+        addresses = [stamps.pop(task.url) for task in answer.items]
+        content = answer.content if answer.content is not None else _given_up(answer)
+        tables = folder.take(
+            content, {one.told: one.stamp for one in addresses}, source=f"the worker's answer {place}"
+        )
+        _note(engine, report, {name: table.to_pylist() for name, table in tables.items() if name in _NOTED})
+        folder.settle(every_s=SETTLE_EVERY_S)
+        progress(1 - len(stamps) / len(waiting))
+    if stamps:
+        raise AssertionError(f"{len(stamps)} logs have no answer, {next(iter(stamps))} among them")
+
+
+_NOTED: Final = ("effort", "logs", "failures")
+
+
+def _answers(engine: Engine[Task], folder: StudyFolder, waiting: Sequence[LogAddress]) -> Iterator[Answer[Task]]:
+    def tasks() -> Iterator[Task]:
+        for one in waiting:
+            known = folder.done.get(one.told)
+            yield Task(one.url, None if known is None else known.content)
+
+    return engine.run(tasks())
+
+
+def _note(engine: Engine[Task], report: StudyReport, tables: dict[str, list[dict[str, Any]]]) -> None:
+    for one in tables.get("effort", ()):
+        engine.note_seconds(one["seconds"])
+        report.seconds += one["seconds"]
+        report.cpu_s += one["cpu_s"]
+        report.unchanged += bool(one["unchanged"])
+    report.done += len(tables.get("logs", ()))
+    report.failures += [(one["log"], one["step"], one["reason"]) for one in tables.get("failures", ())]
+
+
+def _given_up(answer: Answer[Task]) -> bytes:
+    """Rows of logs that no worker could do: they are tried again by the next run."""
+    from chladni import __version__
+
+    logs = [LogAddress(url=task.url).told for task in answer.items]
+    return packed(
+        tables_of(
+            {
+                "logs": [{"log": log, "status": "failed", "failures": 1, "version": __version__} for log in logs],
+                "failures": [{"log": log, "step": "read", "kind": "worker", "reason": answer.reason} for log in logs],
+            }
+        )
+    )

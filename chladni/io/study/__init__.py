@@ -1,0 +1,1 @@
+"""Studies on disk: recipes, tables of results, and the logs that are fetched for them."""
