@@ -12,6 +12,7 @@ from scipy.optimize import nnls
 
 from chladni.gap.calibration import ANOTHER, DETAILS, ELSEWHERE, QUARTER, USUAL
 from chladni.gap.records.diagnosis import PARAMETER
+from chladni.gap.robots.row import Row, columns_of_rows, scaled
 from chladni.gap.robots.term import FOUND, Term
 from chladni.gap.robots.tolerances import tolerances
 from chladni.gap.robots.torques import RIGHT, Torques
@@ -137,17 +138,17 @@ class Contest:
         inside, self._tolerated = tolerances(torques)
         self._told = _told(inside * self._whiten)
         self.within = len(self._told)
-        columns = (self._padded(term.columns) * term.scale[:, None, None] for term in self.terms)
-        self._blocks = np.concatenate([np.tensordot(self._told, inside, 1), *columns])
-        self.count = torques.numbers_a_sample * np.sum(there, axis=1)
-        self._there = np.any(self._blocks, axis=2)
-        self._gram, self._right = self._moments(self._blocks, self._there, self._blocks, self._there)
-        self._energy = np.sum((torques.missing * self._whiten) ** 2, axis=1)
-        self._start = 1.0 / (1.0 + np.maximum(self._energy - self.count, 0.0) / np.maximum(self.count, 1.0))
         starts = np.cumsum([self.within, *(len(term.scale) for term in self.terms)])
         self._places = {
             id(term): np.arange(a, a + len(term.scale)) for term, a in zip(self.terms, starts, strict=False)
         }
+        self._size = int(starts[-1])
+        whole = (np.tensordot(self._told, inside, 1), np.ones(self.within))
+        columns = columns_of_rows(len(torques.missing), [whole, *scaled(self.terms)])
+        self._rows = tuple(self._row(row, *each) for row, each in enumerate(columns))
+        self.count = torques.numbers_a_sample * np.sum(there, axis=1)
+        self._energy = np.sum((torques.missing * self._whiten) ** 2, axis=1)
+        self._start = 1.0 / (1.0 + np.maximum(self._energy - self.count, 0.0) / np.maximum(self.count, 1.0))
         bounds = [term.least / term.scale for term in self.terms]
         self._least = np.concatenate([np.full(self.within, -np.inf), *bounds])
         kinds = {(term.key, term.rare): term for term in self.terms}
@@ -157,30 +158,8 @@ class Contest:
         self.nothing = self.fit(())
         self._before = np.array([one.energy for one in self.nothing.left])
 
-    def _padded(self, columns: Real) -> Real:
-        """Columns of the joints alone with rows of zeros for their loops."""
-        return np.pad(columns, ((0, 0), (0, len(self.torques.missing) - columns.shape[1]), (0, 0)))
-
-    def _moments(self, some: Real, there: Mask, blocks: Real, anywhere: Mask) -> tuple[Real, Real]:
-        """Give ``[row, some, all]`` of whitened columns, and ``[row, some]`` with what is missing.
-
-        Parameters
-        ----------
-        some, blocks
-            ``[number, row, coarse]``: some columns, and all.
-        there, anywhere
-            ``[number, row]``: where they aren't zero.
-        """
-        gram = np.zeros((some.shape[1], len(some), len(blocks)))
-        right = np.zeros(gram.shape[:2])
-        for row, whiten in enumerate(self._whiten):
-            # Most columns are laws of another joint.
-            here, others = np.flatnonzero(there[:, row]), np.flatnonzero(anywhere[:, row])
-            if here.size:
-                left = some[here, row] * whiten**2
-                gram[row][np.ix_(here, others)] = left @ blocks[others, row].T
-                right[row, here] = left @ self.torques.missing[row]
-        return gram, right
+    def _row(self, row: int, numbers: Index, columns: Real) -> Row:
+        return Row.of(numbers, columns, self._whiten[row], self.torques.missing[row])
 
     def _with(self, **parts: object) -> "Contest":
         """Give the same at the same prices, but for these parts."""
@@ -194,23 +173,23 @@ class Contest:
         chosen = self._chosen(terms)
         counts = np.cumsum([self.within, *(len(term.scale) for term in terms)])
         return self._with(
-            terms=list(terms), _blocks=self._blocks[chosen], _least=self._least[chosen], _there=self._there[chosen],
-            _gram=self._gram[:, chosen[:, None], chosen], _right=self._right[:, chosen],
+            terms=list(terms), _rows=tuple(one.among(chosen) for one in self._rows), _size=chosen.size,
+            _least=self._least[chosen],
             _places={id(term): np.arange(a, a + len(term.scale)) for term, a in zip(terms, counts, strict=False)},
         )  # fmt: skip
 
     def joined(self, term: Term) -> "Contest":
         """Give the contest with one term more, at the same prices."""
-        columns = self._padded(term.columns) * term.scale[:, None, None]
-        first, count, there = len(self._blocks), len(columns), np.any(columns, axis=2)
-        blocks, anywhere = np.concatenate([self._blocks, columns]), np.concatenate([self._there, there])
-        gram, right = self._moments(columns, there, blocks, anywhere)
-        whole = np.zeros((len(gram), first + count, first + count))
-        whole[:, :first, :first] = self._gram
-        whole[:, first:], whole[:, :, first:] = gram, np.swapaxes(gram, 1, 2)
+        first, count = self._size, len(term.numbers)
+        more = columns_of_rows(len(self._rows), scaled([term]))
+        both = tuple(
+            self._row(row, np.concatenate([one.numbers, first + numbers]), np.concatenate([one.columns, columns]))
+            if numbers.size
+            else one
+            for row, (one, (numbers, columns)) in enumerate(zip(self._rows, more, strict=True))
+        )
         return self._with(
-            terms=[*self.terms, term], _blocks=blocks, _there=anywhere, _gram=whole,
-            _right=np.concatenate([self._right, right], axis=1),
+            terms=[*self.terms, term], _rows=both, _size=first + count,
             _least=np.concatenate([self._least, term.least / term.scale]),
             _places={**self._places, id(term): np.arange(first, first + count)},
         )  # fmt: skip
@@ -224,7 +203,7 @@ class Contest:
             A fit of nearly the same set, whose weights are begun with.
         """
         chosen = self._chosen(terms)
-        gram, right = self._gram[:, chosen[:, None], chosen], self._right[:, chosen]
+        gram, right = self._moments(chosen)
         laws = self._laws(terms)
         least = self._least[chosen].copy()
         weight = self._start if near is None else near.weight
@@ -245,6 +224,16 @@ class Contest:
             terms=tuple(terms), numbers=numbers, covariance=covariance, left=left, within=self.within,
             nats=known + size + self.prior(terms), weight=weight,
         )  # fmt: skip
+
+    def _moments(self, chosen: Index) -> tuple[Real, Real]:
+        """Give ``[row, chosen, chosen]`` and ``[row, chosen]``."""
+        gram = np.zeros((len(self._rows), chosen.size, chosen.size))
+        right = np.zeros(gram.shape[:2])
+        for row, one in enumerate(self._rows):
+            places, here = one.held(chosen)
+            gram[row, places[:, None], places] = one.gram[here[:, None], here]
+            right[row, places] = one.right[here]
+        return gram, right
 
     def tolerances(self, fit: Fit) -> dict[str, tuple[float, float]]:
         """Give what a fit says of numbers in their tolerances: value and standard deviation, over the tolerance."""
@@ -311,8 +300,8 @@ class Contest:
         for term in terms:
             if term.takes:
                 first = self._places[id(term)][0]
-                for row in np.flatnonzero(self._there[first]).tolist():
-                    taken[row] = taken.get(row, 0.0) + numbers[place] * self._blocks[first, row]
+                for row in self._acting(first):
+                    taken[row] = taken.get(row, 0.0) + numbers[place] * self._rows[row].column(first)
             place += len(term.numbers)
         found = np.ones(len(self._energy))
         for row, part in taken.items():
@@ -330,7 +319,7 @@ class Contest:
         for term in terms:
             if term.over_gain:
                 over = float(term.nominal[0] + numbers[place] * term.scale[0])
-                found[self._there[self._places[id(term)][0]]] *= min(over, 1.0) ** 2
+                found[self._acting(self._places[id(term)][0])] *= min(over, 1.0) ** 2
             place += len(term.numbers)
         return found
 
@@ -364,10 +353,13 @@ class Contest:
         if weight is None:
             weight = np.array([one.weight for one in fit.left])
         chosen = self._chosen(fit.terms)
-        gram = np.zeros((len(self._blocks), chosen.size))
+        gram, rest = np.zeros((self._size, chosen.size)), np.zeros(self._size)
         for row in np.flatnonzero(weight):
-            gram += weight[row] * self._gram[row][:, chosen]
-        rest = weight @ self._right - gram @ fit.numbers
+            one = self._rows[row]
+            places, here = one.held(chosen)
+            gram[one.numbers[:, None], places] += weight[row] * one.gram[:, here]
+            rest[one.numbers] += weight[row] * one.right
+        rest -= gram @ fit.numbers
         found: list[tuple[float, Term]] = []
         for at, terms, blocks in self._alike:
             own = np.tensordot(weight, blocks, 1) + np.eye(at.shape[1])
@@ -387,7 +379,7 @@ class Contest:
         found = []
         for terms in by_count.values():
             at = np.array([self._places[id(one)] for one in terms])
-            found.append((at, terms, self._gram[:, at[:, :, None], at[:, None, :]]))
+            found.append((at, terms, np.array([_blocks(one, at) for one in self._rows])))
         return found
 
     def course(self, fit: Fit) -> tuple[Real, Real]:
@@ -399,14 +391,16 @@ class Contest:
 
     def explained(self, fit: Fit) -> Real:
         """Give ``[joint, coarse]``: missing torque that the numbers of a fit explain."""
-        return np.tensordot(fit.numbers, self._blocks[self._chosen(fit.terms)], 1)
+        numbers = np.zeros(self._size)
+        numbers[self._chosen(fit.terms)] = fit.numbers
+        return np.array([numbers[one.numbers] @ one.columns for one in self._rows])
 
     def shares(self, fit: Fit, place: int) -> Real:
         """Give ``[row]``: power of what a term adds, over that of all that is missing there."""
         first = self.within + sum(len(one.scale) for one in fit.terms[:place])
         at = self._places[id(fit.terms[place])]
         numbers = fit.numbers[first : first + at.size]
-        added = np.einsum("p,jpq,q->j", numbers, self._gram[:, at[:, None], at], numbers)
+        added = np.einsum("p,jpq,q->j", numbers, self._moments(at)[0], numbers)
         return np.asarray(added / np.maximum(self._energy, np.maximum(self.count, 1.0)))
 
     def over_rounding(self, energy: Real) -> Real:
@@ -415,6 +409,14 @@ class Contest:
         changes = np.resize(np.std(self.torques.drive, axis=1), power.size)
         return np.asarray(np.sqrt(power) / np.maximum(RIGHT * changes, 1e-300))
 
+    def rows(self, term: Term) -> frozenset[int]:
+        """Give the rows at which a term acts."""
+        return frozenset(row for number in self._places[id(term)] for row in self._acting(int(number)))
+
+    def _acting(self, number: int) -> list[int]:
+        """Give the rows at which a number acts."""
+        return [row for row, one in enumerate(self._rows) if one.held(np.array([number]))[0].size]
+
     def _chosen(self, terms: Sequence[Term]) -> Index:
         return np.concatenate([np.arange(self.within), *(self._places[id(term)] for term in terms)])
 
@@ -422,6 +424,20 @@ class Contest:
         """Give ``[joint]``: nats that a torque of any shape there would bring beside a fit."""
         alone = log(ANOTHER) - log(len(fit.left)) - DETAILS
         return np.array([replace(one, force=np.inf).log_likelihood - one.log_likelihood + alone for one in fit.left])
+
+
+def _blocks(row: Row, at: Index) -> Real:
+    """``[term, number, number]``: moments at a row of terms whose numbers are at these places ``[term, number]``."""
+    found = np.zeros((*at.shape, at.shape[1]))
+    flat, here = row.held(at.ravel())
+    places = np.full(at.size, -1)
+    places[flat] = here
+    places = places.reshape(at.shape)
+    acting = np.flatnonzero(np.any(places >= 0, axis=1))
+    own = places[acting]
+    both = (own[:, :, None] >= 0) & (own[:, None, :] >= 0)
+    found[acting] = np.where(both, row.gram[own[:, :, None], own[:, None, :]], 0.0)
+    return found
 
 
 def _told(whitened: Real) -> Real:

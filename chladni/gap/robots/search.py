@@ -24,7 +24,11 @@ def searched(
     """Give the most probable set that moves lead to, from nothing or from another set."""
     best = contest.nothing if begin is None else _tidied(contest, begin)
     for move in range(_MOST):
-        better = _tidied(contest, _best([best, *_more(contest, best)]))
+        more = _best([best, *_more(contest, best)])
+        # Far from what is new little changes; before the search ends, all is tried.
+        better = _tidied(contest, more, _changed(contest, best, more))
+        if better.nats < best.nats + _WORTH:
+            better = _tidied(contest, better)
         if better.nats < best.nats + _WORTH:
             break
         best = better
@@ -62,33 +66,51 @@ def _shared(others: Sequence[Term]) -> Iterable[list[Term]]:
         yield [term for term in alone if term.kind == kind]
 
 
-def _tidied(contest: Contest, best: Fit) -> Fit:
-    """Drop terms, and exchange each for another where it acts, while that helps."""
+def _changed(contest: Contest, one: Fit, other: Fit) -> frozenset[int]:
+    """Give the rows at which terms act that one of two sets has alone."""
+    kept = {id(term) for term in one.terms} & {id(term) for term in other.terms}
+    return frozenset[int]().union(
+        *(contest.rows(term) for term in (*one.terms, *other.terms) if id(term) not in kept)
+    )
+
+
+def _tidied(contest: Contest, best: Fit, rows: frozenset[int] | None = None) -> Fit:
+    """Drop terms, and exchange each for another where it acts, while that helps.
+
+    Parameters
+    ----------
+    rows
+        Where terms act that are tried; all when None.
+    """
     while True:
-        places = range(len(best.terms))
-        found = [one for place in places for one in alternatives(contest, best, place, _EXCHANGED, _BEHIND)]
-        better = _best([best, *found, *_merged(contest, best), *_exchanged(contest, best)])
+        tried = [place for place, term in enumerate(best.terms) if rows is None or rows & contest.rows(term)]
+        found = [one for place in tried for one in alternatives(contest, best, place, _EXCHANGED, _BEHIND)]
+        better = _best([best, *found, *_merged(contest, best, tried), *_exchanged(contest, best, tried)])
         if better is best:
             return best
+        if rows is not None:
+            rows |= _changed(contest, best, better)
         best = better
 
 
-def _merged(contest: Contest, best: Fit) -> list[Fit]:
+def _merged(contest: Contest, best: Fit, tried: Sequence[int]) -> list[Fit]:
     """Fit one term in place of all that stand at a site: two idealisations may be one other law."""
     found = []
+    sites = {best.terms[place].site for place in tried}
     for site, count in Counter(term.site for term in best.terms).items():
-        if count > 1:
+        if count > 1 and site in sites:
             rest = contest.fit([term for term in best.terms if term.site != site], best)
             near = [term for _, term in contest.promise(rest) if term.site == site]
             found += [contest.fit([*rest.terms, term], rest) for term in near[:_EXCHANGED]]
     return found
 
 
-def _exchanged(contest: Contest, best: Fit) -> list[Fit]:
+def _exchanged(contest: Contest, best: Fit, tried: Sequence[int]) -> list[Fit]:
     """Fit another word at all sites of one that several have, as they're made alike; or one term in place of all."""
     found = []
+    kinds = {(best.terms[place].word, best.terms[place].rare) for place in tried}
     for kind, count in Counter((term.word, term.rare) for term in best.terms).items():
-        if count == 1:
+        if count == 1 or kind not in kinds:
             continue
         sites = {term.site for term in best.terms if (term.word, term.rare) == kind}
         rest = contest.fit([term for term in best.terms if (term.word, term.rare) != kind], best)
