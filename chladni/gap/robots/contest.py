@@ -430,9 +430,8 @@ def _blocks(row: Row, at: Index) -> Real:
     """``[term, number, number]``: moments at a row of terms whose numbers are at these places ``[term, number]``."""
     found = np.zeros((*at.shape, at.shape[1]))
     flat, here = row.held(at.ravel())
-    places = np.full(at.size, -1)
-    places[flat] = here
-    places = places.reshape(at.shape)
+    places = np.full(at.shape, -1)
+    places.ravel()[flat] = here
     acting = np.flatnonzero(np.any(places >= 0, axis=1))
     own = places[acting]
     both = (own[:, :, None] >= 0) & (own[:, None, :] >= 0)

@@ -1,5 +1,6 @@
 """Which motion of a robot would tell apart what a log leaves open, as a sentence with the command that makes it."""
 
+import gc
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -224,6 +225,8 @@ def _alone(joint: RobotJoint) -> list[Motion]:
 
 def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
     """Nats by which the truth would be ahead, whichever it is; None when the motion can't be made."""
+    # Laws hold the torques that hold them: those of the motion before stay until they're collected.
+    gc.collect()
     torques = contest.torques
     robot = replace(torques.robot, model=loaded(torques.robot.model, motion.payload))
     one, other = doubt.terms
