@@ -78,7 +78,7 @@ class _Sum(ABC):
     def mean(self) -> NDArray[Any]:
         """See `SegmentAverage`."""
         # The sum of weights, not the number of segments: right from the first segment of an exponential average.
-        # Times its inverse, as NumPy divides complex numbers: so the powers are those of the matrix to the last bit.
+        # Times its inverse, as NumPy divides complex numbers: so the powers are those of the matrix to rounding.
         density = self._density()
         density *= 1 / self.weight
         return density
@@ -122,7 +122,7 @@ class WeightedSum(_Sum):
 
 
 class WeightedPowers(_Sum):
-    """Sum of |X|^2, each channel alone: the diagonal of `WeightedSum` to the last bit, without the pairs."""
+    """Sum of |X|^2, each channel alone: the diagonal of `WeightedSum` to rounding, without the pairs."""
 
     def __init__(self, lines: int, channels: int, decay: float = 1.0) -> None:
         super().__init__(np.zeros((lines, 2 * channels)), decay)

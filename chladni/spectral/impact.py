@@ -217,7 +217,7 @@ def _average(
         spectrum = scipy.fft.rfft(_record(series, impacts, hit, length) * windows) / rate_hz
         products.add(total, spectrum, spectrum)
     total *= one_sided_weights(length)
-    # Times the inverse, as NumPy divides complex numbers: so the powers are those of the matrix to the last bit.
+    # Times the inverse, as NumPy divides complex numbers: so the powers are those of the matrix to rounding.
     total *= 1 / (len(impacts.accepted) * impacts.record_s)
     return products.spectra(
         frequency_hz=line_frequencies_hz(length, rate_hz),

@@ -134,7 +134,7 @@ def _spectra(first: TimeSeries, period: Period, scatter: _PeriodScatter[SpectraT
     products, noise_density = scatter.products, scatter.total
     noise_density *= scale
     # The mean of products is the product of means and the scatter about them. Times inverses, as NumPy divides
-    # complex numbers: so the powers are those of the matrix to the last bit.
+    # complex numbers: so the powers are those of the matrix to rounding.
     density = products.zeros(*scatter.mean.shape)
     products.add(density, scatter.mean, scatter.mean)
     density *= scale

@@ -175,10 +175,11 @@ def test_a_hammer_excites_to_30_db_below_its_plateau():
     [(series(noise(7, 20_000)), "linear"), (with_role(repeating(), "b"), "periodic"), (hammer_test(), "impact")],
     ids=["segments", "periods", "hits"],
 )
-def test_powers_alone_are_those_of_the_matrix_to_the_last_bit(source, averaging, options):
+def test_powers_alone_are_those_of_the_matrix_to_rounding(source, averaging, options):
     pairs, alone = adaptive_cross_spectra(source, **options), adaptive_auto_spectra(source, **options)
     assert options or alone.provenance.averaging == averaging
-    assert_close(power_spectral_density(alone), power_spectral_density(pairs), rtol=0, atol=0)
+    # BLAS of some processors sums a large product in another order than a small one.
+    assert_close(power_spectral_density(alone), power_spectral_density(pairs), rtol=64 * np.finfo(float).eps, atol=0)
 
 
 @pytest.mark.parametrize("make", [noise, lambda channels, samples: np.tile(noise(channels, samples // 8), 8)])
