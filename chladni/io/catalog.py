@@ -11,8 +11,8 @@ from chladni.io.arrival import arrival_order
 from chladni.io.batch_messages import BatchLayout
 from chladni.io.channel_source import ChannelSource
 from chladni.io.loss import Unread
-from chladni.io.mcap.container import McapContainer
 from chladni.io.message_path import MessagePath, near_matches, parse_message_path
+from chladni.io.messages import Messages
 from chladni.io.number_lists import NumberLists
 from chladni.io.publishers import at_once, evenly_in_turn
 from chladni.io.setup import ChannelSetup, Setup, refined
@@ -161,7 +161,7 @@ class Catalog:
         )
 
 
-def read_catalog(container: McapContainer, *, setup: Setup, request: StampRequest) -> Catalog:
+def read_catalog(container: Messages, *, setup: Setup, request: StampRequest) -> Catalog:
     """Look at the channels of a log and at the first messages of each topic.
 
     Raises
@@ -226,7 +226,7 @@ def _listed(readable: Mapping[str, TopicChannels], topics: Sequence[str]) -> tup
 
 
 def _parts(
-    container: McapContainer, readable: Mapping[str, TopicChannels], setup: Setup
+    container: Messages, readable: Mapping[str, TopicChannels], setup: Setup
 ) -> tuple[dict[str, dict[str, TopicChannels]], dict[str, str]]:
     """Look at each MCAP channel of topics that have several by itself; what can't be read is told as a topic is."""
     parts: dict[str, dict[str, TopicChannels]] = {}
@@ -240,7 +240,7 @@ def _parts(
 
 
 def _publishers(
-    container: McapContainer, readable: Mapping[str, TopicChannels], parts: Mapping[str, Mapping[str, TopicChannels]]
+    container: Messages, readable: Mapping[str, TopicChannels], parts: Mapping[str, Mapping[str, TopicChannels]]
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
     """Find the topics whose MCAP channels send the same at once, and those where they do so evenly in turn."""
     several = {name: readable[name].topic for name in parts if any(True for _ in readable[name].listed())}
@@ -319,7 +319,7 @@ def _start_ns(
 
 
 def _unread(
-    container: McapContainer, readable: Mapping[str, TopicChannels], refused: Mapping[str, str]
+    container: Messages, readable: Mapping[str, TopicChannels], refused: Mapping[str, str]
 ) -> Iterator[Unread]:
     known = container.message_counts()
     messages: dict[str, int] = {}

@@ -1,6 +1,6 @@
 """A stream: channels of one topic whose samples come in the same messages, and so at the same times."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -12,8 +12,8 @@ from chladni.io.batch_messages import BatchLayout, expand
 from chladni.io.channel_source import ChannelSource
 from chladni.io.decoding import Decoded
 from chladni.io.field_selector import FieldFilter
-from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.message_batch import MessageBatch
+from chladni.io.messages import Messages
 from chladni.io.selected_numbers import kept_messages, select
 from chladni.io.stamps import LATEST_NS, StampChoice, own_stamps_ns, plausible
 from chladni.io.topic import Topic
@@ -74,6 +74,23 @@ class Piece:
         if end_ns is not None:
             keep &= self.stamps_ns < end_ns
         return self.kept(keep)
+
+    def kept_slice(self, part: slice) -> "Piece":
+        """Give some messages in a row."""
+        if self.counts is None:
+            samples, counts = part, None
+        else:
+            ends = np.append(0, np.cumsum(self.counts))
+            first, last, _ = part.indices(self.stamps_ns.size)
+            samples, counts = slice(int(ends[first]), int(ends[max(first, last)])), self.counts[part]
+        return replace(
+            self,
+            stamps_ns=self.stamps_ns[part],
+            counts=counts,
+            values=self.values[:, samples],
+            arrivals=self.arrivals.kept(part),
+            eras=None if self.eras is None else self.eras[part],
+        )
 
     def kept(self, keep: Mask) -> "Piece":
         """Give some of the messages."""
@@ -286,7 +303,7 @@ def _column(
 
 
 def read_pieces(
-    container: McapContainer,
+    container: Messages,
     streams: Sequence[Stream],
     *,
     start_ns: int | None = None,
@@ -312,13 +329,40 @@ def read_pieces(
         Of the stream.
     piece : Piece
     """
-    of_channel: dict[int, dict[int, Stream]] = {}
-    for number, stream in enumerate(streams):
-        for channel_id in stream.topic.decoders:
-            of_channel.setdefault(channel_id, {})[number] = stream
-    readers = {channel_id: _Readers.of(channel_id, some) for channel_id, some in of_channel.items()}
-    for stretch, batch in numbered(container.batches(readers, start_time_ns=start_ns, end_time_ns=end_ns)):
-        reader = readers[batch.channel_id]
+    reader = PieceReader(streams)
+    batches = container.batches(reader.channel_ids, start_time_ns=start_ns, end_time_ns=end_ns)
+    yield from reader.pieces(batches, with_values=with_values)
+
+
+class PieceReader:
+    """Takes the samples of streams out of batches of messages.
+
+    Parameters
+    ----------
+    streams
+        What to read; streams of the same topic are decoded together.
+    """
+
+    def __init__(self, streams: Sequence[Stream]) -> None:
+        self._streams = tuple(streams)
+        of_channel: dict[int, dict[int, Stream]] = {}
+        for number, stream in enumerate(streams):
+            for channel_id in stream.topic.decoders:
+                of_channel.setdefault(channel_id, {})[number] = stream
+        self._readers = {channel_id: _Readers.of(channel_id, some) for channel_id, some in of_channel.items()}
+
+    @property
+    def channel_ids(self) -> frozenset[int]:
+        """MCAP channels whose messages are read."""
+        return frozenset(self._readers)
+
+    def pieces(self, batches: Iterable[MessageBatch], *, with_values: bool = True) -> Iterator[tuple[int, Piece]]:
+        """Give the number of a stream and what each batch holds of it, in the order of the batches."""
+        for stretch, batch in numbered(batches):
+            yield from self._of_batch(batch, stretch, with_values=with_values)
+
+    def _of_batch(self, batch: MessageBatch, stretch: int, *, with_values: bool) -> Iterator[tuple[int, Piece]]:
+        reader, streams = self._readers[batch.channel_id], self._streams
         yield from ((index, streams[index].without(len(batch), why)) for index, why in reader.refused.items())
         for part in batch.parts(max(1, VALUES_AT_ONCE // max(1, len(reader.leaves)))) if reader.streams else ():
             decoded = streams[reader.streams[0]].topic.decode(part, reader.leaves)

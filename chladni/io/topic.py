@@ -13,8 +13,8 @@ from chladni.io.arrival import Arrivals, arrival_order, numbered
 from chladni.io.clock.stray_stamps import untimed
 from chladni.io.decoding import Decoded, Decoder, FieldInfo, definition_text, make_decoder
 from chladni.io.mcap.channel_registry import McapChannel
-from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.message_batch import MessageBatch
+from chladni.io.messages import Messages
 from chladni.signals.errors import LogError
 
 HEAD_MESSAGES: Final = 64
@@ -215,7 +215,7 @@ def apart(topic: Topic, channels: Mapping[int, McapChannel]) -> dict[str, Topic]
 # --- first messages ----------------------------------------------------------------------------------------------
 
 
-def read_heads(container: McapContainer, topics: Mapping[str, Topic]) -> tuple[dict[str, Topic], dict[str, str]]:
+def read_heads(container: Messages, topics: Mapping[str, Topic]) -> tuple[dict[str, Topic], dict[str, str]]:
     """Give the topics with their first messages.
 
     All topics are looked for together, since most begin in the same few chunks; those that don't are then looked
@@ -269,9 +269,7 @@ def _fill(
             return
 
 
-def read_earlier_heads(
-    container: McapContainer, topics: Mapping[str, Topic]
-) -> tuple[dict[str, Topic], dict[str, str]]:
+def read_earlier_heads(container: Messages, topics: Mapping[str, Topic]) -> tuple[dict[str, Topic], dict[str, str]]:
     """Give the topics with the messages that are first by time as their heads, where a log stores others before them.
 
     Nothing is read where the log holds no message that was logged before all the heads. Those that can't be decoded
@@ -295,7 +293,7 @@ def read_earlier_heads(
     return {name: topic for name, topic in found.items() if topic.decoders}, refused
 
 
-def read_arrivals(container: McapContainer, topics: Mapping[str, Topic]) -> dict[str, Arrivals]:
+def read_arrivals(container: Messages, topics: Mapping[str, Topic]) -> dict[str, Arrivals]:
     """Give the arrivals of all messages of some topics, those left out whose log time is no time."""
     owner = {channel: topic for topic in topics.values() for channel in topic.decoders}
     parts: dict[str, list[Arrivals]] = {name: [] for name in topics}

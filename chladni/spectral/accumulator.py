@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.arrays import Real
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, find_channel
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.number_range import LARGEST, largest_magnitudes, require_in_range
@@ -160,8 +160,14 @@ class SpectraAccumulator(Generic[SpectraT]):
         self.stretch.merge(flushed.stretch)
         self.largest = np.maximum(self.largest, flushed.largest)
 
-    def result(self) -> SpectraT:
+    def result(self, *, sample_rate_hz: float | None = None) -> SpectraT:
         """Give the average so far; more blocks may follow.
+
+        Parameters
+        ----------
+        sample_rate_hz
+            True rate, where it's known better than when the first block came; None for that of the blocks. Sums over
+            segments don't depend on it.
 
         Raises
         ------
@@ -175,7 +181,7 @@ class SpectraAccumulator(Generic[SpectraT]):
         if flushed.count.segments == 0:
             raise EstimateError(self._nothing_averaged())
         require_in_range(self.channels, self.largest)
-        samples, rate = self.segmentation.samples, self.sample_rate_hz
+        samples, rate = self.segmentation.samples, sample_rate_hz or self.sample_rate_hz
         density = flushed.average.mean()
         density *= one_sided_weights(samples) / (rate * np.sum(self._window**2))
         result: SpectraT = self.products.spectra(
@@ -183,7 +189,7 @@ class SpectraAccumulator(Generic[SpectraT]):
             density=density,
             channels=self.channels,
             bandwidth_hz=noise_bandwidth_bins(self._window) * rate / samples,
-            provenance=self._provenance(flushed.count),
+            provenance=self._provenance(flushed.count, rate),
         )
         return result
 
@@ -230,6 +236,27 @@ class SpectraAccumulator(Generic[SpectraT]):
         bytes_each = 16 * len(self.channels) * (self.segmentation.samples // 2 + 1)
         return min(MOST_SEGMENTS_TOGETHER, max(1, BYTES_TOGETHER // bytes_each))
 
+    def select(self, channels: Sequence[str]) -> Self:
+        """Give an independent accumulator of some of the channels, which goes on from here without the others.
+
+        Raises
+        ------
+        EstimateError
+            When there is no such channel.
+        """
+        rows = np.array([find_channel(self.channels, name) for name in channels])
+        twin = type(self).__new__(type(self))
+        twin.__dict__.update(
+            self.__dict__,
+            channels=tuple(self.channels[row] for row in rows),
+            average=self.average.select(rows),
+            count=self.count.copy(),
+            stretch=self.stretch.copy(),
+            largest=self.largest[rows],
+            _held=self._held.select(rows),
+        )
+        return twin
+
     def flushed(self, executor: Executor | None = None) -> Self:
         """Give an independent copy in which every whole segment has been averaged."""
         twin = type(self).__new__(type(self))
@@ -243,19 +270,19 @@ class SpectraAccumulator(Generic[SpectraT]):
         twin.average_held(executor)
         return twin
 
-    def _provenance(self, count: EffectiveAverages) -> Provenance:
+    def _provenance(self, count: EffectiveAverages, rate_hz: float) -> Provenance:
         # The largest of many scatters like a single one, not like their mean.
         effective = 1.0 if self.averaging == "peak-hold" else count.value
         return Provenance(
             window=window_name(self.segmentation.window),
-            segment_s=self.segmentation.samples / self.sample_rate_hz,
+            segment_s=self.segmentation.samples / rate_hz,
             overlap=self.segmentation.overlap,
             averages=count.segments,
             effective_averages=effective,
             averaging=self.averaging,
             detrend=self.segmentation.detrend,
             skipped=self.stretch.skipped,
-            longest_s=self.stretch.longest_run / self.sample_rate_hz,
+            longest_s=self.stretch.longest_run / rate_hz,
             notes=self._notes(count.segments),
         )
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.arrays import Complex, Real
+from chladni.signals.arrays import Complex, Real, Whole
 from chladni.spectral.segment_spectra import run_all
 
 # Lines handled together, so that a product still sits in the cache when it's added to the sum.
@@ -28,6 +28,9 @@ class SegmentAverage(Protocol):
 
     def copy(self) -> Self:
         """Give an independent copy."""
+
+    def select(self, rows: Whole) -> Self:
+        """Give an independent copy of some of the channels."""
 
     def mean(self) -> NDArray[Any]:
         """Give ``[channel, channel, frequency]``, conj(X_i) X_j averaged or held, unscaled; or its real diagonal."""
@@ -73,6 +76,14 @@ class _Sum(ABC):
         """See `SegmentAverage`."""
         twin = copy(self)
         twin.products = self.products.copy()
+        return twin
+
+    def select(self, rows: Whole) -> Self:
+        """See `SegmentAverage`."""
+        twin = copy(self)
+        # Re and Im of each channel stand side by side.
+        parts = np.stack((2 * rows, 2 * rows + 1), axis=1).ravel()
+        twin.products = _selected(self.products, parts)
         return twin
 
     def mean(self) -> NDArray[Any]:
@@ -171,6 +182,12 @@ class _Hold(ABC):
         twin.held = self.held.copy()
         return twin
 
+    def select(self, rows: Whole) -> Self:
+        """See `SegmentAverage`."""
+        twin = copy(self)
+        twin.held = _selected(self.held, rows)
+        return twin
+
     def mean(self) -> NDArray[Any]:
         """See `SegmentAverage`."""
         return np.ascontiguousarray(np.moveaxis(self.held, 0, -1))
@@ -202,3 +219,9 @@ class PowerHold(_Hold):
 
     def _of(self, segment: Complex) -> NDArray[Any]:
         return np.asarray((segment.conj() * segment).real)
+
+
+def _selected(products: NDArray[Any], rows: Whole) -> NDArray[Any]:
+    """Some of the channels of ``[line, channel]`` or ``[line, channel, channel]``."""
+    chosen = products[:, rows] if products.ndim == 2 else products[:, rows[:, np.newaxis], rows]
+    return np.ascontiguousarray(chosen)

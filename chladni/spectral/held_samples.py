@@ -5,6 +5,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.signals.arrays import Whole
+
 
 class HeldSamples:
     """A queue of ``[channel, sample]`` pieces, joined only when they're needed, so that short blocks cost little."""
@@ -36,4 +38,10 @@ class HeldSamples:
         """Give an independent queue of the same pieces."""
         twin = type(self)()
         twin.replace_pieces(list(self._pieces))
+        return twin
+
+    def select(self, rows: Whole) -> Self:
+        """Give an independent queue of some of the channels."""
+        twin = type(self)()
+        twin.replace_pieces([piece[rows] for piece in self._pieces])
         return twin

@@ -1,6 +1,6 @@
 """Spectra over time: the waterfall."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from chladni.io.source import Blocks, SeriesLike, blocks_of
 from chladni.signals.arrays import Real
-from chladni.signals.channel import Names
+from chladni.signals.channel import Channel, Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import LARGEST, require_in_range
 from chladni.signals.provenance import Provenance
@@ -16,6 +16,7 @@ from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.waterfall import Waterfall
 from chladni.spectral.accumulator import line_frequencies_hz, one_sided_weights
 from chladni.spectral.blocks import leading_part, samples_known
+from chladni.spectral.held_samples import HeldSamples
 from chladni.spectral.segment_spectra import segment_spectra
 from chladni.spectral.segmentation import SAMPLES_TO_CHOOSE_FROM, Detrend, Segmentation, plan_segmentation
 from chladni.spectral.windows import Window, noise_bandwidth_bins, window_name, window_samples
@@ -89,12 +90,131 @@ def waterfall(
     lead, blocks = leading_part(source, SAMPLES_TO_CHOOSE_FROM)
     known = samples_known(source, lead, SAMPLES_TO_CHOOSE_FROM)
     plan = _plan(lead[0].sample_rate_hz, known, resolution_hz, window=window, overlap=overlap, detrend=detrend)
-    # An even number can always be halved by averaging pairs.
-    slices = _Slices(most=max_slices - max_slices % 2)
-    shape = window_samples(window, plan.samples)
-    for spectra in _segments(blocks, lead[0], plan, shape):
-        slices.add(spectra)
-    return _assembled(lead[0], plan, shape, slices)
+    accumulator = WaterfallAccumulator(lead[0].channels, lead[0].sample_rate_hz, plan, max_slices=max_slices)
+    for block in blocks:
+        accumulator.update(block)
+    return accumulator.result()
+
+
+class WaterfallAccumulator:
+    """Running waterfall, see `waterfall`; mutable, the result is a frozen value.
+
+    Parameters
+    ----------
+    channels, sample_rate_hz
+        Of every block.
+    segmentation
+        Segments and their window.
+    max_slices
+        As for `waterfall`.
+    """
+
+    def __init__(
+        self,
+        channels: Sequence[Channel],
+        sample_rate_hz: float,
+        segmentation: Segmentation,
+        *,
+        max_slices: int = 512,
+    ) -> None:
+        self.channels = tuple(channels)
+        self.sample_rate_hz = sample_rate_hz
+        self.segmentation = segmentation
+        self._window = window_samples(segmentation.window, segmentation.samples)
+        # An even number can always be halved by averaging pairs.
+        self._slices = _Slices(most=max_slices - max_slices % 2)
+        self._start_ns: int | None = None
+        self._position = 0
+        self._held = HeldSamples()
+        self._largest = np.zeros(len(self.channels))
+
+    def update(self, block: TimeSeries) -> None:
+        """Take in the next block.
+
+        Raises
+        ------
+        EstimateError
+            When it has other channels or another rate, doesn't follow the one before, or holds values too large to be
+            squared.
+        """
+        for values in self._portions(block):
+            # NaN stands for what is missing, and is passed over.
+            largest = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
+            self._largest = np.fmax(self._largest, largest)
+            require_in_range(self.channels, np.where(self._largest > LARGEST, self._largest, 0.0))
+            count = self.segmentation.count(self._held.samples + values.shape[1])
+            if not count:
+                self._held.append(values)
+                continue
+            held = self._held.joined(values)
+            whole = held[:, : self.segmentation.length_of(count)]
+            spectra = segment_spectra(whole, self.segmentation, self._window)
+            self._slices.add(np.abs(spectra.transpose(1, 2, 0)) ** 2)
+            # What the next segment begins with stays; it overlaps the last one done.
+            self._held.replace(held[:, count * self.segmentation.hop :])
+
+    def result(self, *, sample_rate_hz: float | None = None) -> Waterfall:
+        """Give the waterfall so far; more blocks may follow.
+
+        Parameters
+        ----------
+        sample_rate_hz
+            True rate, where it's known better than when the first block came.
+
+        Raises
+        ------
+        EstimateError
+            When no whole segment has come.
+        """
+        if not self._slices.count:
+            raise EstimateError("not a single segment has come; wait, or take a coarser resolution")
+        require_in_range(self.channels, self._largest)
+        return self._assembled(sample_rate_hz or self.sample_rate_hz)
+
+    def _portions(self, block: TimeSeries) -> Iterator[Real]:
+        """Samples in portions of bounded size, NaN where nothing was measured, gaps between blocks included."""
+        size = max(1, PORTION // len(self.channels))
+        if block.channels != self.channels or block.sample_rate_hz != self.sample_rate_hz:
+            raise EstimateError(
+                "blocks of a waterfall need the same channels and rate; resample or select them first"
+            )
+        if self._start_ns is None:
+            self._start_ns = block.start_time_ns
+        start = round((block.start_time_ns - self._start_ns) / NS_PER_S * self.sample_rate_hz)
+        if not 0 <= start - self._position <= LONGEST_GAP_SAMPLES:
+            raise EstimateError(
+                f"a block starts {(start - self._position) / self.sample_rate_hz:g} s after the one before ended; "
+                "give consecutive blocks, and measurements far apart one by one"
+            )
+        # A gap is silence of known length: time must go on, or everything after it would be drawn too early.
+        for missing in range(self._position, start, size):
+            yield np.full((len(self.channels), min(size, start - missing)), np.nan)
+        for begin in range(0, block.samples, size):
+            yield _marked(block, slice(begin, begin + size))
+        self._position = start + block.samples
+
+    def _assembled(self, rate_hz: float) -> Waterfall:
+        power, number = self._slices.slices()
+        plan, slices = self.segmentation, self._slices
+        scale = one_sided_weights(plan.samples) / (rate_hz * np.sum(self._window**2))
+        return Waterfall(
+            time_s=(number * plan.hop + plan.samples / 2) / rate_hz,
+            frequency_hz=line_frequencies_hz(plan.samples, rate_hz),
+            values=power * scale.astype(power.dtype),
+            channels=self.channels,
+            start_time_ns=self._start_ns or 0,
+            bandwidth_hz=noise_bandwidth_bins(self._window) * rate_hz / plan.samples,
+            provenance=Provenance(
+                estimator="PSD over time",
+                window=window_name(plan.window),
+                segment_s=plan.samples / rate_hz,
+                overlap=plan.overlap,
+                averages=slices.group,
+                effective_averages=float(slices.group),
+                detrend=plan.detrend,
+                notes=_grouping_note(slices, plan, rate_hz),
+            ),
+        )
 
 
 def _plan(rate_hz: float, known: int | None, resolution_hz: float | None, **options: Any) -> Segmentation:
@@ -151,77 +271,11 @@ def _precision(power: Real) -> type[np.float32 | np.float64]:
     return np.float32 if fits.all() else np.float64
 
 
-def _segments(blocks: Iterator[TimeSeries], first: TimeSeries, plan: Segmentation, window: Real) -> Iterator[Real]:
-    """Powers ``[segment, channel, frequency]`` of portion after portion, the segments that span two portions too."""
-    held = np.empty((len(first.channels), 0))
-    largest = np.zeros(len(first.channels))
-    for values in _portions(blocks, first):
-        # NaN stands for what is missing, and is passed over.
-        largest = np.fmax(largest, np.fmax.reduce(np.abs(values), axis=1, initial=0.0))
-        require_in_range(first.channels, np.where(largest > LARGEST, largest, 0.0))
-        held = np.concatenate([held, values], axis=1)
-        count = plan.count(held.shape[1])
-        if not count:
-            continue
-        spectra = segment_spectra(held[:, : plan.length_of(count)], plan, window)
-        yield np.abs(spectra.transpose(1, 2, 0)) ** 2
-        # What the next segment begins with stays; it overlaps the last one done.
-        held = held[:, count * plan.hop :]
-    require_in_range(first.channels, largest)
-
-
-def _portions(blocks: Iterator[TimeSeries], first: TimeSeries) -> Iterator[Real]:
-    """Samples in portions of bounded size, NaN where nothing was measured, gaps between blocks included."""
-    size = max(1, PORTION // len(first.channels))
-    position = 0
-    for block in blocks:
-        if block.channels != first.channels or block.sample_rate_hz != first.sample_rate_hz:
-            raise EstimateError(
-                "blocks of a waterfall need the same channels and rate; resample or select them first"
-            )
-        start = round((block.start_time_ns - first.start_time_ns) / NS_PER_S * first.sample_rate_hz)
-        if not 0 <= start - position <= LONGEST_GAP_SAMPLES:
-            raise EstimateError(
-                f"a block starts {(start - position) / first.sample_rate_hz:g} s after the one before ended; give "
-                "consecutive blocks, and measurements far apart one by one"
-            )
-        # A gap is silence of known length: time must go on, or everything after it would be drawn too early.
-        for missing in range(position, start, size):
-            yield np.full((len(first.channels), min(size, start - missing)), np.nan)
-        for begin in range(0, block.samples, size):
-            yield _marked(block, slice(begin, begin + size))
-        position = start + block.samples
-
-
 def _marked(block: TimeSeries, part: slice) -> Real:
     values = block.values[:, part].astype(np.float64)
     if block.valid is not None:
         values[~block.valid[:, part]] = np.nan
     return values
-
-
-def _assembled(first: TimeSeries, plan: Segmentation, window: Real, slices: _Slices) -> Waterfall:
-    rate_hz = first.sample_rate_hz
-    power, number = slices.slices()
-    scale = one_sided_weights(plan.samples) / (rate_hz * np.sum(window**2))
-    return Waterfall(
-        time_s=(number * plan.hop + plan.samples / 2) / rate_hz,
-        frequency_hz=line_frequencies_hz(plan.samples, rate_hz),
-        values=power * scale.astype(power.dtype),
-        channels=first.channels,
-        start_time_ns=first.start_time_ns,
-        bandwidth_hz=noise_bandwidth_bins(window) * rate_hz / plan.samples,
-        provenance=Provenance(
-            estimator="PSD over time",
-            window=window_name(plan.window),
-            segment_s=plan.samples / rate_hz,
-            overlap=plan.overlap,
-            averages=slices.group,
-            effective_averages=float(slices.group),
-            detrend=plan.detrend,
-            notes=_grouping_note(slices, plan, rate_hz),
-        ),
-    )
 
 
 def _grouping_note(slices: _Slices, plan: Segmentation, rate_hz: float) -> tuple[str, ...]:

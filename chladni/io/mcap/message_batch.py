@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.signals.arrays import Bytes, Whole
+from chladni.signals.arrays import Bytes, Mask, Whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,12 +48,15 @@ class MessageBatch:
             yield self
             return
         for first in range(0, len(self), size):
-            part = slice(first, first + size)
-            yield replace(
-                self,
-                offsets=self.offsets[part],
-                lengths=self.lengths[part],
-                log_time_ns=self.log_time_ns[part],
-                publish_time_ns=self.publish_time_ns[part],
-                sequence=self.sequence[part],
-            )
+            yield self.kept(slice(first, first + size))
+
+    def kept(self, chosen: slice | Mask) -> "MessageBatch":
+        """Give some of the messages."""
+        return replace(
+            self,
+            offsets=self.offsets[chosen],
+            lengths=self.lengths[chosen],
+            log_time_ns=self.log_time_ns[chosen],
+            publish_time_ns=self.publish_time_ns[chosen],
+            sequence=self.sequence[chosen],
+        )

@@ -17,7 +17,7 @@ from chladni.io.mcap.records import (
     Opcode,
 )
 from chladni.io.mcap.selection import Selection
-from chladni.signals.arrays import Bytes, Mask, Whole
+from chladni.signals.arrays import Bytes, Whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,7 +96,7 @@ def _add_batch(content: StretchContent, batch: MessageBatch, selection: Selectio
     if first < 0 or batch.publish_time_ns.min() < 0:
         sound = (log_time >= 0) & (batch.publish_time_ns >= 0)
         _report_times(content, batch.channel_id, int(len(sound) - sound.sum()))
-        batch = _chosen(batch, sound)
+        batch = batch.kept(sound)
         if len(batch) == 0:
             return
         first, last = int(batch.log_time_ns.min()), int(batch.log_time_ns.max())
@@ -106,21 +106,9 @@ def _add_batch(content: StretchContent, batch: MessageBatch, selection: Selectio
     if batch.channel_id not in selection.channel_ids or not selection.touches(first, last):
         return
     if not selection.covers(first, last):
-        batch = _chosen(batch, selection.mask(batch.log_time_ns))
+        batch = batch.kept(selection.mask(batch.log_time_ns))
     if len(batch):
         content.batches.append(batch)
-
-
-def _chosen(batch: MessageBatch, mask: Mask) -> MessageBatch:
-    return MessageBatch(
-        channel_id=batch.channel_id,
-        buffer=batch.buffer,
-        offsets=batch.offsets[mask],
-        lengths=batch.lengths[mask],
-        log_time_ns=batch.log_time_ns[mask],
-        publish_time_ns=batch.publish_time_ns[mask],
-        sequence=batch.sequence[mask],
-    )
 
 
 def _report_times(content: StretchContent, channel_id: int, count: int) -> None:

@@ -1,0 +1,1 @@
+"""Logs that are still being written, servers and instruments: samples as they come."""
