@@ -30,6 +30,7 @@ _HOME = {
     "tuned_model": "chladni.apps.explained_model",
     "LevelLocation": "chladni.apps.level_location",
     "locate_from_levels": "chladni.apps.level_location",
+    "live": "chladni.apps.live",
     "identify_modes": "chladni.apps.modes",
     "plot": "chladni.apps.plot",
     "show": "chladni.apps.show",
@@ -333,6 +334,7 @@ __all__ = [
     "joint_log",
     "kurtogram",
     "levels",
+    "live",
     "load_model",
     "load_robot",
     "load_setup",
@@ -406,6 +408,7 @@ if TYPE_CHECKING:
     from chladni.apps.diagnose import diagnose_gap
     from chladni.apps.explained_model import explained_model, tuned_model
     from chladni.apps.level_location import LevelLocation, locate_from_levels
+    from chladni.apps.live import live
     from chladni.apps.modes import identify_modes
     from chladni.apps.plot import plot
     from chladni.apps.show import show, write_report

@@ -28,7 +28,7 @@ SURFACE = {
     "differentiate", "differentiate_density", "drive_model", "element_block", "envelope", "excite",
     "explained_model", "explained_simulator", "find_impacts", "find_peaks", "find_response_peaks",
     "fit_mr_damper", "force_along_motion", "frf", "highpass", "identify_modes", "impact_cross_spectra",
-    "influence", "integrate", "integrate_density", "join_references", "joint_log", "kurtogram", "levels",
+    "influence", "integrate", "integrate_density", "join_references", "joint_log", "kurtogram", "levels", "live",
     "load_model", "load_robot", "load_setup", "locate_from_levels", "lowpass", "mac", "machine_harmonics",
     "make_demo_log", "merge_setups", "mr_damper_at", "mr_record", "mujoco_simulator", "notebook", "octaves",
     "open", "open_log", "optimise", "order_cuts", "order_map", "partial_coherence", "phase_referenced_shape",

@@ -26,6 +26,7 @@ from chladni.cli.gap import gap
 from chladni.cli.influence import influence
 from chladni.cli.info import info
 from chladni.cli.levels import levels
+from chladni.cli.live import live
 from chladni.cli.modes import modes
 from chladni.cli.octaves import octaves
 from chladni.cli.ods import ods
@@ -70,6 +71,7 @@ for command in (
     tolerance,
     zoom,
     view,
+    live,
     compare,
     study,
     query,

@@ -78,6 +78,8 @@ class RunningAverages:
         Segments and their window; that of the waterfall has at most 2048 samples.
     pairs
         Whether the spectra of channel pairs are averaged, which frequency responses, coherence and modes need.
+    fading_pairs_s
+        Time constant of exponential averages of the pairs, too; None without.
     bands_hz
         Of the levels; None for all that was sampled.
     time_constant_s
@@ -98,6 +100,7 @@ class RunningAverages:
         segmentation: Segmentation,
         *,
         pairs: bool = True,
+        fading_pairs_s: float | None = None,
         bands_hz: Sequence[tuple[float, float]] | None = None,
         time_constant_s: float = TIME_CONSTANT_S,
         machine: Machine | None = None,
@@ -106,7 +109,14 @@ class RunningAverages:
         self.sample_rate_hz = sample_rate_hz
         self.segmentation = segmentation
         self.samples = 0
-        self._all = _Spectra.of(channels, sample_rate_hz, segmentation, pairs=pairs, time_constant_s=time_constant_s)
+        self._all = _Spectra.of(
+            channels,
+            sample_rate_hz,
+            segmentation,
+            pairs=pairs,
+            fading_pairs_s=fading_pairs_s,
+            time_constant_s=time_constant_s,
+        )
         # Of the channels that still give something, while others don't.
         self._living: _Spectra | None = None
         self._levels = LevelsAccumulator(channels, sample_rate_hz, bands_hz=bands_hz)
@@ -193,6 +203,12 @@ class RunningAverages:
             raise EstimateError("spectra of pairs of channels aren't averaged; ask for them")
         return self._best.pairs.result(sample_rate_hz=sample_rate_hz)
 
+    def recent_spectra(self) -> CrossSpectra:
+        """Give the exponential average of the cross-spectra; errors as for `spectra`."""
+        if self._best.fading is None:
+            raise EstimateError("spectra of pairs of channels aren't averaged exponentially; ask for them")
+        return self._best.fading.result()
+
     def response(
         self, references: Sequence[str], *, spectra: CrossSpectra | None = None
     ) -> tuple[FrequencyResponse, Coherence]:
@@ -235,10 +251,18 @@ class _Spectra:
 
     powers: dict[SegmentAveraging, AutoSpectraAccumulator]
     pairs: CrossSpectraAccumulator | None
+    fading: CrossSpectraAccumulator | None
 
     @classmethod
     def of(
-        cls, channels: Sequence[Channel], rate_hz: float, plan: Segmentation, *, pairs: bool, time_constant_s: float
+        cls,
+        channels: Sequence[Channel],
+        rate_hz: float,
+        plan: Segmentation,
+        *,
+        pairs: bool,
+        fading_pairs_s: float | None,
+        time_constant_s: float,
     ) -> Self:
         constants: dict[SegmentAveraging, float | None] = {
             "linear": None,
@@ -251,6 +275,11 @@ class _Spectra:
                 for kind, constant_s in constants.items()
             },
             pairs=CrossSpectraAccumulator(channels, rate_hz, plan) if pairs else None,
+            fading=None
+            if fading_pairs_s is None
+            else CrossSpectraAccumulator(
+                channels, rate_hz, plan, averaging="exponential", time_constant_s=fading_pairs_s
+            ),
         )
 
     @property
@@ -260,13 +289,15 @@ class _Spectra:
     def update(self, block: TimeSeries) -> None:
         for accumulator in self.powers.values():
             accumulator.update(block)
-        if self.pairs is not None:
-            self.pairs.update(block)
+        for pairs in (self.pairs, self.fading):
+            if pairs is not None:
+                pairs.update(block)
 
     def select(self, names: Sequence[str]) -> "_Spectra":
         return _Spectra(
             powers={kind: one.select(names) for kind, one in self.powers.items()},
             pairs=None if self.pairs is None else self.pairs.select(names),
+            fading=None if self.fading is None else self.fading.select(names),
         )
 
 

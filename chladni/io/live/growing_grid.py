@@ -73,10 +73,10 @@ class GrowingGrid:
             for one, own, placement in zip(places, rows.rows, group.placements, strict=True)
         ]
 
-    @property
-    def rate_hz(self) -> float:
-        """Rate of the grid, as the stamps so far tell it."""
-        return self._lanes[0].places.rate.rate_hz()
+    def rate_hz(self, *, fitted: bool) -> float:
+        """Rate of the grid, as the stamps so far tell it; fitted as that of a finished log, or quickly."""
+        rate = self._lanes[0].places.rate
+        return rate.rate_hz() if fitted else rate.quick_rate_hz()
 
     def put(self, number: int, placed: PlacedMessages) -> None:
         """Take samples of one of the streams."""
@@ -153,8 +153,9 @@ class GrowingGrid:
         told = []
         for lane in self._lanes:
             if lane.too_late:
-                what = f"{counted(lane.too_late, 'sample')} of {lane.places.stream.label} came after their place was given"
-                told.append(Told(kind="late", text=f"{what}; they are left out", samples=lane.too_late))
+                what = f"{counted(lane.too_late, 'sample')} of {lane.places.stream.label}"
+                text = f"{what} came after their place was given; they are left out"
+                told.append(Told(kind="late", text=text, samples=lane.too_late))
                 lane.too_late = 0
         return told
 

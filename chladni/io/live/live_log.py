@@ -100,12 +100,12 @@ class LiveLog:
         """Channels that give nothing at present."""
         return tuple(name for grid in self._grids for name in grid.silent_channels)
 
-    def rate_hz(self, channels: Sequence[Channel]) -> float | None:
-        """Rate of a grid, given by its channels, as all stamps so far tell it."""
+    def rate_hz(self, channels: Sequence[Channel], *, fitted: bool = True) -> float | None:
+        """Rate of a grid, given by its channels, as all stamps so far tell it; `fitted` takes a moment."""
         names = {channel.name for channel in channels}
         for grid in self._grids:
             if names <= {channel.name for channel in grid.channels}:
-                return grid.rate_hz
+                return grid.rate_hz(fitted=fitted)
         return None
 
     def receive(self, timeout_s: float) -> Samples:
@@ -133,6 +133,17 @@ class LiveLog:
         if found.ended and not self._grids:
             raise LogError(self._nothing())
         return Samples(blocks=tuple(blocks), told=tuple(told), ended=found.ended)
+
+    def finish(self) -> Samples:
+        """Give all that is held, where nobody waits for more."""
+        told = self._understand(ended=True)
+        self._flush()
+        blocks = []
+        for grid in self._grids:
+            complete, more = grid.blocks(last=True)
+            blocks += complete
+            told += more
+        return Samples(blocks=tuple(blocks), told=tuple(told), ended=True)
 
     def close(self) -> None:
         """Let go of the source."""
@@ -348,7 +359,10 @@ class LiveLog:
         self._ignored.add(channel)
 
     def _nothing(self) -> str:
-        return f"{self.name}: it ended and no channel had uniform samples; 'chladni info LOG' tells what a finished log holds"
+        return (
+            f"{self.name}: it ended and no channel had uniform samples; 'chladni info LOG' tells what a finished log "
+            "holds"
+        )
 
 
 def _of_beginning(placement: Placement) -> list[Told]:

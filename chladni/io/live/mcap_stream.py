@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping
 from functools import cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from chladni.io.mcap.chunk import ChunkRules, chunk_content, open_chunk
 from chladni.io.mcap.damage import Damage
 from chladni.io.mcap.data_section import ChunkSegment
 from chladni.io.mcap.limits import Limits
-from chladni.io.mcap.message_batch import MessageBatch
 from chladni.io.mcap.message_table import table_from_walk
 from chladni.io.mcap.record_walk import walk_records
 from chladni.io.mcap.records import (
@@ -30,6 +29,9 @@ from chladni.io.mcap.selection import Selection
 from chladni.io.mcap.stretch_content import StretchContent, fill_content
 from chladni.signals.errors import LogError
 from chladni.signals.wording import counted
+
+if TYPE_CHECKING:
+    from chladni.io.mcap.message_batch import MessageBatch
 
 _BARE: Final = frozenset([Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL])
 _END: Final = frozenset([Opcode.DATA_END, Opcode.FOOTER])

@@ -41,8 +41,8 @@ class Told:
     kind
         ``source``: of the file, the connection or the instrument; ``topic``: of a topic that appeared or can't be
         read; ``gap``: samples missing; ``clock``: a clock that was set; ``late``: messages left out; ``silent`` and
-        ``back``: a topic that gives nothing, and one that gives again; ``skipped``: dropped since the computer couldn't
-        follow.
+        ``back``: a topic that gives nothing, and one that gives again; ``skipped``: dropped since the computer
+        couldn't follow.
     text
         A sentence.
     time_ns

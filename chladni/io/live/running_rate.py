@@ -1,5 +1,7 @@
 """Rate of a clock whose stamps keep coming: the slope of time over index, without keeping all of them."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from chladni.io.clock.clock_verdict import round_rate
@@ -74,7 +76,7 @@ class RunningRate:
         per_message = max(1.0, float(np.median(steps)))
         starts = np.flatnonzero(steps > NEW_STRETCH * per_message)
         edges = [0, *starts.tolist(), time_ns.size]
-        for number, (first, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        for number, (first, end) in enumerate(pairwise(edges)):
             if number:
                 self._close()
             if end > first:
@@ -87,6 +89,10 @@ class RunningRate:
             base = self._kept.place(stated=self._stated, clock=clock).time_base
             if base.uniform:
                 return base.rate_hz
+        return self.quick_rate_hz()
+
+    def quick_rate_hz(self) -> float:
+        """Give the rate by the sums alone."""
         return self._nearest(NS_PER_S / self.period_ns)
 
     def _nearest(self, rate_hz: float) -> float:

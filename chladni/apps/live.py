@@ -1,0 +1,470 @@
+"""A log that is still being written: averages that run, modes that are followed, and what changes."""
+
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from chladni.apps.excitation import FORCE_UNITS, excitations
+from chladni.apps.modal_channels import motions_of_one_unit
+from chladni.apps.modes import Band, Wanted, modes_of_spectra
+from chladni.io.live.door import LiveSamples, open_live
+from chladni.io.live.reception import MessageSource, Samples
+from chladni.io.setup import Setup
+from chladni.io.stamps import StampRequest
+from chladni.modal.operational.mode_tracking import ModeTracker
+from chladni.signals.channel import Channel, Names, as_names
+from chladni.signals.cross_spectra import CrossSpectra
+from chladni.signals.errors import EstimateError, SetupError
+from chladni.signals.linear_algebra import in_one_thread
+from chladni.signals.live_state import EventKind, LiveEvent, LiveState
+from chladni.signals.mode_set import ModeSet
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.spectral.change_watch import ChangeWatch
+from chladni.spectral.running import TIME_CONSTANT_S, RunningAverages, running_segmentation
+from chladni.spectral.severity import Machine
+from chladni.spectral.windows import Window
+
+#: How long a source is waited for; a state comes at least as often while samples do.
+POLL_S: Final = 0.02
+#: How often averages are renewed, and modes looked for.
+AVERAGES_EVERY_S: Final = 0.5
+MODES_EVERY_S: Final = 5.0
+#: Work that renews averages takes at most this share of a core's time.
+SHARE: Final = 0.25
+#: More channels than these, and modes of the present are looked for in the average over all.
+MOST_FADING: Final = 32
+#: Time constant of the averages from which modes of the present are taken.
+RECENT_S: Final = 20.0
+
+
+def live(
+    source: "str | Path | MessageSource | LiveSamples",
+    *,
+    channels: Names | None = None,
+    references: Names | None = None,
+    band_hz: Band | None = None,
+    resolution_hz: float | None = None,
+    window: Window = "hann",
+    overlap: float = 0.5,
+    time_constant_s: float = TIME_CONSTANT_S,
+    modes_every_s: float = MODES_EVERY_S,
+    machine: Machine | None = None,
+    setup: Setup | Path | str | None = None,
+    stamp: StampRequest = "auto",
+    sample_rate_hz: float | None = None,
+    patience_s: float | None = None,
+    stop: threading.Event | None = None,
+) -> Iterator[LiveState]:
+    """Follow a source of samples: running averages, modes, and what changes beyond scatter.
+
+    Parameters
+    ----------
+    source
+        Path of an MCAP log that a recorder is still writing, followed to its footer; ``-``, MCAP on standard input;
+        ``ws://HOST:PORT``, a Foxglove WebSocket server. Or what gives messages or blocks of samples itself.
+    channels
+        Message paths; None for every channel whose samples are uniform.
+    references
+        Excitations; None takes the channels whose role is reference, else the first force that changes.
+    band_hz
+        Where modes are looked for and levels are measured; None for everywhere.
+    resolution_hz, window, overlap
+        Of spectra, as for `chladni.psd`; lines of None are such that a segment takes 2 s at most.
+    time_constant_s
+        Of the exponential averages.
+    modes_every_s
+        How often modes are looked for in the responses alone; 0 for never.
+    machine
+        Class and foundation, for the zone of severity.
+    setup, stamp, sample_rate_hz
+        As for `chladni.open_log`.
+    patience_s
+        Seconds without anything new after which the source counts as ended; None waits for ever.
+    stop
+        Ends it when set, with a last state.
+
+    Yields
+    ------
+    LiveState
+        Whenever samples came, something happened, or averages were renewed; the last has `ended` set.
+
+    Raises
+    ------
+    LogError
+        When the source can't be opened or is no log; what happens later is told in the states.
+    SetupError
+        When the setup file or an option doesn't fit.
+
+    Examples
+    --------
+    >>> for state in live("arm.mcap"):  # doctest: +SKIP
+    ...     for event in state.events:
+    ...         print(f"{event.time_s:.1f} s: {event.text}")
+    """
+    options = _Options(
+        references=None if references is None else as_names(references),
+        band_hz=band_hz,
+        resolution_hz=resolution_hz,
+        window=window,
+        overlap=overlap,
+        time_constant_s=time_constant_s,
+        modes_every_s=modes_every_s,
+        machine=machine,
+    )
+    if isinstance(source, str | Path | MessageSource):
+        samples = open_live(
+            source,
+            channels=None if channels is None else as_names(channels),
+            setup=setup,
+            stamp=stamp,
+            sample_rate_hz=sample_rate_hz,
+            patience_s=patience_s,
+        )
+    else:
+        samples = source
+    session = _Session(samples, options)
+    try:
+        yield from session.run(stop or threading.Event())
+    finally:
+        session.close()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Options:
+    references: Sequence[str] | None
+    band_hz: Band | None
+    resolution_hz: float | None
+    window: Window
+    overlap: float
+    time_constant_s: float
+    modes_every_s: float
+    machine: Machine | None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.time_constant_s < float("inf"):
+            raise SetupError(f"time_constant_s is {self.time_constant_s}; it must be positive and finite")
+        if not 0 <= self.modes_every_s < float("inf"):
+            raise SetupError(f"modes_every_s is {self.modes_every_s}; it must be 0 (never) or more, and finite")
+
+
+class _Schedule:
+    """Says when it's time again for some work, so that it takes a bounded share of the time."""
+
+    def __init__(self, every_s: float) -> None:
+        self._every_s = every_s
+        self._next_s = 0.0
+
+    @property
+    def due(self) -> bool:
+        return time.monotonic() >= self._next_s
+
+    def done(self, took_s: float) -> None:
+        self._next_s = time.monotonic() + max(self._every_s, took_s / SHARE)
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Grid:
+    """Averages of one sampling grid."""
+
+    averages: RunningAverages
+    watch: ChangeWatch
+    silent: tuple[str, ...] = ()
+    moved: set[str] = field(default_factory=set)
+    first: dict[str, float] = field(default_factory=dict)
+
+
+class _Session:
+    """One run from the first sample to the last."""
+
+    def __init__(self, samples: LiveSamples, options: _Options) -> None:
+        self._samples = samples
+        self._options = options
+        self._grids: dict[tuple[Channel, ...], _Grid] = {}
+        self._tracker = ModeTracker()
+        self._spectra_due = _Schedule(AVERAGES_EVERY_S)
+        self._pairs_due = _Schedule(2 * AVERAGES_EVERY_S)
+        self._modes_due = _Schedule(options.modes_every_s)
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="modes")
+        self._look: Future[_Look] | None = None
+        self._start_ns: int | None = None
+        self._end_ns = 0
+        self._told: set[str] = set()
+        self._events: list[LiveEvent] = []
+        self._values: dict[str, Any] = {}
+
+    def run(self, stop: threading.Event) -> Iterator[LiveState]:
+        """Give states until the source ends or `stop` is set."""
+        while True:
+            ending = stop.is_set()
+            got = self._samples.finish() if ending else self._samples.receive(POLL_S)
+            blocks = self._take(got)
+            ended = got.ended or ending
+            fresh = self._renew(ended=ended)
+            if blocks or self._events or fresh or ended:
+                yield self._state(blocks, fresh=fresh, ended=ended)
+            if ended:
+                return
+
+    def close(self) -> None:
+        """Let go of the source and of the thread."""
+        self._samples.close()
+        self._worker.shutdown(wait=True, cancel_futures=True)
+
+    # --- samples ---
+
+    def _take(self, got: Samples) -> tuple[TimeSeries, ...]:
+        taken = []
+        for told in got.told:
+            self._tell(told.kind, told.text, told.time_ns, told.samples)
+        for block in got.blocks:
+            if self._start_ns is None:
+                self._start_ns = block.start_time_ns
+            try:
+                self._average(block)
+            except EstimateError as error:
+                self._tell(
+                    "skipped", f"{block.samples} samples are left out of the averages: {error}", None, block.samples
+                )
+                continue
+            self._end_ns = max(self._end_ns, block.start_time_ns + round(block.duration_s * NS_PER_S))
+            taken.append(block)
+        return tuple(taken)
+
+    def _average(self, block: TimeSeries) -> None:
+        grid = self._grids.get(block.channels) or self._begin(block)
+        silent = tuple(name for name in self._samples.silent_channels if name in {one.name for one in block.channels})
+        if silent != grid.silent:
+            grid.silent = silent
+            grid.averages.leave_out(silent)
+        grid.averages.update(block)
+        _note_moving(grid, block)
+        for change in grid.watch.update(block):
+            self._tell(change.kind, change.text, change.time_ns)
+
+    def _begin(self, block: TimeSeries) -> _Grid:
+        options = self._options
+        plan = running_segmentation(
+            block.sample_rate_hz, resolution_hz=options.resolution_hz, window=options.window, overlap=options.overlap
+        )
+        pairs = len(block.channels) > 1 or options.modes_every_s > 0
+        fading = pairs and options.modes_every_s > 0 and len(block.channels) <= MOST_FADING
+        averages = RunningAverages(
+            block.channels,
+            block.sample_rate_hz,
+            plan,
+            pairs=pairs,
+            fading_pairs_s=max(RECENT_S, options.time_constant_s) if fading else None,
+            bands_hz=None if options.band_hz is None else [options.band_hz],
+            time_constant_s=options.time_constant_s,
+            machine=options.machine,
+        )
+        for note in averages.notes:
+            self._tell("note", note, None)
+        grid = _Grid(averages=averages, watch=ChangeWatch(block.channels, block.sample_rate_hz, plan))
+        self._grids[block.channels] = grid
+        return grid
+
+    def _tell(self, kind: EventKind, text: str, time_ns: int | None, samples: int = 0) -> None:
+        start_ns = self._start_ns
+        at_ns = self._end_ns if time_ns is None else time_ns
+        time_s = 0.0 if start_ns is None or not at_ns else (at_ns - start_ns) / NS_PER_S
+        self._events.append(LiveEvent(kind=kind, time_s=time_s, text=text, samples=samples))
+
+    def _once(self, text: str) -> None:
+        """Tell what needn't be told again."""
+        if text not in self._told:
+            self._told.add(text)
+            self._tell("note", text, None)
+
+    # --- averages ---
+
+    def _renew(self, *, ended: bool) -> bool:
+        """Renew what it's time for; at the end, all."""
+        fresh = False
+        if self._grids and (ended or self._spectra_due.due):
+            fresh = self._timed(self._spectra_due, lambda: self._renew_spectra(ended))
+        if self._grids and (ended or self._pairs_due.due):
+            self._timed(self._pairs_due, lambda: self._renew_response(ended))
+        if self._grids and self._options.modes_every_s > 0:
+            self._renew_modes(ended)
+        return fresh
+
+    def _timed(self, schedule: _Schedule, work: Any) -> bool:
+        begun_s = time.monotonic()
+        done = bool(work())
+        schedule.done(time.monotonic() - begun_s)
+        return done
+
+    def _renew_spectra(self, ended: bool) -> bool:
+        found: dict[str, list[Any]] = {
+            name: [] for name in ("densities", "exponential", "peak_hold", "waterfalls", "levels", "severities")
+        }
+        for channels, grid in self._grids.items():
+            rate_hz = self._samples.rate_hz(channels, fitted=ended)
+            averages = grid.averages
+            try:
+                found["densities"] += averages.densities("linear", sample_rate_hz=rate_hz)
+                found["exponential"] += averages.densities("exponential", sample_rate_hz=rate_hz)
+                found["peak_hold"] += averages.densities("peak-hold", sample_rate_hz=rate_hz)
+                found["waterfalls"].append(averages.waterfall(sample_rate_hz=rate_hz))
+            except EstimateError as error:
+                if ended:
+                    self._once(str(error))
+            try:
+                found["levels"].append(averages.levels())
+                severity = averages.severity()
+                found["severities"] += [] if severity is None else [severity]
+            except EstimateError as error:
+                if ended:
+                    self._once(str(error))
+        self._values |= {name: tuple(some) for name, some in found.items()}
+        return True
+
+    def _renew_response(self, ended: bool) -> bool:
+        for channels, grid in self._grids.items():
+            names = self._references(channels, grid)
+            if not names or len(names) == len(channels):
+                continue
+            try:
+                spectra = grid.averages.spectra(sample_rate_hz=self._samples.rate_hz(channels, fitted=ended))
+                held = {channel.name for channel in spectra.channels}
+                if set(names) <= held and len(held) > len(names):
+                    response, coherent = grid.averages.response(names, spectra=spectra)
+                    self._values |= {"response": response, "coherence": coherent}
+            except EstimateError as error:
+                if ended:
+                    self._once(str(error))
+        return True
+
+    def _references(self, channels: Sequence[Channel], grid: _Grid) -> tuple[str, ...]:
+        known = {channel.name for channel in channels}
+        if self._options.references is not None:
+            return tuple(name for name in self._options.references if name in known)
+        return excitations([channel for channel in channels if channel.name in grid.moved])
+
+    # --- modes ---
+
+    def _renew_modes(self, ended: bool) -> None:
+        if self._look is not None and (ended or self._look.done()):
+            self._enter(self._look.result())
+            self._look = None
+        if not (ended or (self._look is None and self._modes_due.due)):
+            return
+        grid = max(self._grids.items(), key=lambda item: len(item[0]))
+        job = self._job(*grid, ended=ended)
+        if job is None:
+            return
+        if ended:
+            self._enter(job.look())
+        else:
+            self._look = self._worker.submit(job.look)
+
+    def _job(self, channels: Sequence[Channel], grid: _Grid, *, ended: bool) -> "_Job | None":
+        references = self._references(channels, grid)
+        answers = [
+            channel
+            for channel in channels
+            if channel.name in grid.moved and channel.name not in references and channel.unit not in FORCE_UNITS
+            and channel.name not in grid.silent
+        ]  # fmt: skip
+        names, notes = motions_of_one_unit(answers, named=False)
+        if not names:
+            return None
+        for note in notes:
+            self._once(note)
+        try:
+            whole = grid.averages.spectra(sample_rate_hz=self._samples.rate_hz(channels, fitted=ended)).select(names)
+            recent = whole if len(channels) > MOST_FADING else grid.averages.recent_spectra().select(names)
+        except EstimateError as error:
+            if ended:
+                self._once(str(error))
+            return None
+        wanted = Wanted.of(
+            bands_hz=None if self._options.band_hz is None else [self._options.band_hz],
+            count=None,
+            frequencies_hz=None,
+        )
+        return _Job(whole=whole, recent=recent, wanted=wanted, time_s=self._time_s)
+
+    def _enter(self, look: "_Look") -> None:
+        self._modes_due.done(look.took_s)
+        if look.why is not None:
+            self._once(look.why)
+        if look.whole is not None:
+            self._values["modes"] = look.whole
+        if look.recent is not None:
+            for text in self._tracker.look(look.recent, look.time_s):
+                self._tell("mode", text, None)
+            self._values |= {"recent": look.recent, "tracked": self._tracker.modes}
+
+    # --- states ---
+
+    @property
+    def _time_s(self) -> float:
+        return 0.0 if self._start_ns is None else (self._end_ns - self._start_ns) / NS_PER_S
+
+    def _state(self, blocks: tuple[TimeSeries, ...], *, fresh: bool, ended: bool) -> LiveState:
+        events, self._events = tuple(self._events), []
+        return LiveState(
+            title=self._samples.name,
+            start_time_ns=self._start_ns or 0,
+            time_s=self._time_s,
+            series=blocks,
+            events=events,
+            fresh=fresh,
+            geometry=self._samples.geometry,
+            ended=ended,
+            **self._values,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Look:
+    """Modes found at one look; `why` says why there are none."""
+
+    whole: ModeSet | None
+    recent: ModeSet | None
+    why: str | None
+    time_s: float
+    took_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Job:
+    """Averages from which modes are to be identified."""
+
+    whole: CrossSpectra
+    recent: CrossSpectra
+    wanted: Wanted
+    time_s: float
+
+    @in_one_thread()
+    def look(self) -> _Look:
+        """Identify the modes of both averages."""
+        begun_s = time.monotonic()
+        whole, why = self._of(self.whole)
+        recent, _ = (whole, why) if self.recent is self.whole else self._of(self.recent)
+        return _Look(whole=whole, recent=recent, why=why, time_s=self.time_s, took_s=time.monotonic() - begun_s)
+
+    def _of(self, spectra: CrossSpectra) -> tuple[ModeSet | None, str | None]:
+        try:
+            return modes_of_spectra(spectra, method=None, wanted=self.wanted), None
+        except EstimateError:
+            # Mostly too few averages yet; at the end there is a note on it.
+            return None, None
+
+
+def _note_moving(grid: _Grid, block: TimeSeries) -> None:
+    """Remember which channels showed more than one value."""
+    if len(grid.moved) == len(block.channels):
+        return
+    for channel, row in zip(block.channels, block.values, strict=True):
+        if channel.name in grid.moved:
+            continue
+        known = row[row == row]  # NaN is missing
+        if known.size and (known.min() < known.max() or grid.first.setdefault(channel.name, known[0]) != known[0]):
+            grid.moved.add(channel.name)

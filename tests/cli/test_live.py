@@ -1,0 +1,84 @@
+"""``chladni live``: from a log on disk or on standard input to recording, report and document."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chladni.apps.spectra import psd
+from tests.arm import write_arm
+from tests.cli.conftest import Run
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("arm")
+    write_arm(folder)
+    return folder / "arm.mcap"
+
+
+def test_a_finished_log_ends_by_its_footer_with_everything_written(run: Run, arm: Path, tmp_path: Path) -> None:
+    found = run(
+        "live", arm, "--save", tmp_path / "a.rrd", "--json", "-", "--report", tmp_path / "a.html", "--resolution", "2"
+    )
+    assert found.code == 0
+    document = found.document
+    assert document["format"] == "chladni.live/1"
+    reference = psd(arm, resolution_hz=2.0)
+    names = [one["name"] for one in document["psd"]["channels"]]
+    for channel, values in zip(reference.channels, reference.values, strict=True):
+        mine = document["psd"]["channels"][names.index(channel.name)]
+        np.testing.assert_allclose(mine["psd"], values, rtol=1e-12)
+    assert (tmp_path / "a.rrd").stat().st_size > 10_000
+    assert "<html" in (tmp_path / "a.html").read_text()
+
+
+def test_options_that_cant_be_are_one_line(run: Run, arm: Path, tmp_path: Path) -> None:
+    for words, told in (
+        (("--stamp", "never"), "--stamp 'never' is none of auto, header, publish, log"),
+        (("--keep", "1"), "--keep 1 MB is too little"),
+        (("--save", tmp_path / "a.rrd", "--web"), "give one of them"),
+        (("--time-constant", "0"), "time_constant_s is 0"),
+        (("--channel", "/nowhere.x"), "no channel"),
+    ):
+        found = run("live", arm, "--no-view", *words)
+        assert found.code == 2
+        assert told in found.err
+        assert found.err.count("\n") == 1
+
+
+def test_ctrl_c_leaves_recording_and_document(arm: Path, tmp_path: Path) -> None:
+    """A recorder that writes half of its log into our standard input, and then nothing."""
+    content = arm.read_bytes()
+    command = [
+        sys.executable,
+        "-m",
+        "chladni",
+        "live",
+        "-",
+        "--save",
+        tmp_path / "a.rrd",
+        "--json",
+        tmp_path / "a.json",
+    ]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=False) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(content[: 2 * len(content) // 3])
+        process.stdin.flush()
+        # The first line says that samples came.
+        process.stdout.readline()
+        time.sleep(0.5)
+        os.kill(process.pid, signal.SIGINT)
+        process.wait(timeout=30)
+    assert process.returncode == 0
+    document = json.loads((tmp_path / "a.json").read_text())
+    assert document["duration_s"] > 1
+    assert document["psd"]["channels"]
+    assert (tmp_path / "a.rrd").stat().st_size > 10_000

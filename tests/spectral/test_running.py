@@ -1,0 +1,55 @@
+"""Averages that run: channels that give nothing don't stop the others."""
+
+import numpy as np
+
+from chladni.spectral.cross_spectra import cross_spectra
+from chladni.spectral.running import RunningAverages, running_segmentation
+from tests.spectral.made_signals import blocks, noise, series
+
+RATE_HZ = 500.0
+PLAN = running_segmentation(RATE_HZ)
+
+
+def test_channels_left_out_keep_their_average_and_the_others_go_on() -> None:
+    values = noise(3, 40_000)
+    values[1, 20_000:] = np.nan
+    whole = series(values, rate_hz=RATE_HZ, valid=np.isfinite(values))
+    averages = RunningAverages(whole.channels, RATE_HZ, PLAN)
+    for number, block in enumerate(blocks(whole, [1000] * 40)):
+        if number == 20:
+            averages.leave_out(["b"])
+        averages.update(block)
+    alive, dead = averages.densities()
+    assert [channel.name for channel in alive.channels] == ["a", "c"]
+    assert [channel.name for channel in dead.channels] == ["b"]
+    resolution_hz = RATE_HZ / PLAN.samples
+    # Segments went on across the moment at which the third fell silent.
+    others = cross_spectra(whole.select(["a", "c"]), resolution_hz=resolution_hz)
+    first_half = cross_spectra(series(values[:, :20_000], rate_hz=RATE_HZ), resolution_hz=resolution_hz)
+    np.testing.assert_allclose(alive.values, np.einsum("iif->if", others.density).real, rtol=1e-12)
+    np.testing.assert_allclose(dead.values[0], first_half.density[1, 1].real, rtol=1e-12)
+    assert averages.spectra().channels == alive.channels
+
+
+def test_a_channel_that_is_back_is_averaged_with_all_again() -> None:
+    values = noise(2, 30_000)
+    values[1, 10_000:20_000] = np.nan
+    whole = series(values, rate_hz=RATE_HZ, valid=np.isfinite(values))
+    averages = RunningAverages(whole.channels, RATE_HZ, PLAN)
+    for number, block in enumerate(blocks(whole, [1000] * 30)):
+        averages.leave_out(["b"] if 10 <= number < 20 else [])
+        averages.update(block)
+    (found,) = averages.densities()
+    reference = cross_spectra(whole, resolution_hz=RATE_HZ / PLAN.samples)
+    np.testing.assert_allclose(found.values, np.einsum("iif->if", reference.density).real, rtol=1e-12)
+
+
+def test_a_rate_that_is_told_later_scales_the_average() -> None:
+    whole = series(noise(2, 20_000), rate_hz=RATE_HZ)
+    averages = RunningAverages(whole.channels, RATE_HZ, PLAN)
+    averages.update(whole)
+    true_hz = 499.9
+    (found,) = averages.densities(sample_rate_hz=true_hz)
+    reference = cross_spectra(series(whole.values, rate_hz=true_hz), resolution_hz=true_hz / PLAN.samples)
+    np.testing.assert_allclose(found.frequency_hz, reference.frequency_hz, rtol=1e-15)
+    np.testing.assert_allclose(found.values, np.einsum("iif->if", reference.density).real, rtol=1e-12)

@@ -1,0 +1,127 @@
+"""A live source in rerun: everything that came is in the recording, whatever the disk and the viewer do."""
+
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun_cli
+
+from chladni.signals.live_state import LiveEvent, LiveState
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.time_series import TimeSeries
+from chladni.viewers.rerun.live_targets import Painter, RecordingFile, Target
+from tests.viewers.rrd import Contents
+
+RATE_HZ, START_NS = 1000.0, 1_700_000_000_000_000_000
+RERUN = Path(rerun_cli.__file__).parent / "rerun"
+
+
+def states(count: int, *, samples: int = 100) -> list[LiveState]:
+    rng = np.random.default_rng(0)
+    found = []
+    for number in range(count):
+        series = TimeSeries.from_arrays(
+            {"a": rng.standard_normal(samples), "b": rng.standard_normal(samples)},
+            sample_rate_hz=RATE_HZ,
+            units="m/s^2",
+            start_time_ns=START_NS + round(number * samples / RATE_HZ * 1e9),
+        )
+        density = PowerSpectralDensity.from_arrays(
+            np.arange(65.0), rng.random((2, 65)), names=["a", "b"], units="m/s^2", averages=10
+        )
+        found.append(
+            LiveState(
+                title="made",
+                start_time_ns=START_NS,
+                time_s=(number + 1) * samples / RATE_HZ,
+                series=(series,),
+                events=(LiveEvent(kind="gap", time_s=0.5, text="one missing"),) if number == 1 else (),
+                fresh=number % 5 == 0,
+                densities=(density,),
+                ended=number == count - 1,
+            )
+        )
+    return found
+
+
+def test_a_recording_holds_every_sample_and_every_event(tmp_path: Path) -> None:
+    shown = states(20)
+    target = RecordingFile(tmp_path / "a.rrd")
+    with Painter(target) as painter:
+        told = [text for state in shown for text in painter.show(state)]
+    assert told == []
+    contents = Contents(tmp_path / "a.rrd")
+    waves = contents.scalars("/waveforms/1/acceleration")
+    np.testing.assert_array_equal(waves, np.concatenate([one.series[0].values for one in shown], axis=1).T)
+    assert contents.column("/events", "TextLog:text") == [["one missing"]]
+    assert "What happened and changed" in contents.view_names()
+    subprocess.run([RERUN, "rrd", "verify", tmp_path / "a.rrd"], check=True, capture_output=True)
+
+
+def test_a_recording_is_bounded_and_both_its_files_are_whole(tmp_path: Path) -> None:
+    most = 400_000
+    target = RecordingFile(tmp_path / "a.rrd", keep_bytes=most)
+    with Painter(target) as painter:
+        for state in states(150, samples=500):
+            assert painter.show(state) == ()
+            time.sleep(0.002)
+    sizes = [path.stat().st_size for path in (target.path, target.earlier)]
+    # A turn comes after the state that filled a file, and with a blueprint.
+    assert sum(sizes) < 1.5 * most
+    last = [float(Contents(path).times("/waveforms/1/acceleration", "time")[-1]) / 1e9 for path in tmp_path.iterdir()]
+    assert max(last) == pytest.approx(75.0 - 1 / RATE_HZ)
+
+
+def test_a_disk_that_is_full_is_told_and_the_states_go_on() -> None:
+    painter = Painter(RecordingFile("/dev/full"))
+    told = []
+    for state in states(50):
+        told += painter.show(state)
+        time.sleep(0.01)
+    told += painter.close()
+    assert told == ["the recording ended: No space left on device; the averages go on without it"]
+
+
+class Slow(Target):
+    """A viewer that takes a tenth of a second for each state."""
+
+    what = "the viewer"
+
+    def __init__(self) -> None:
+        self.drawn: list[LiveState] = []
+
+    def draw(self, state: LiveState) -> None:
+        time.sleep(0.02)
+        self.drawn.append(state)
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_slow_viewer_holds_nothing_up_and_what_it_lacks_is_told() -> None:
+    slow = Slow()
+    painter = Painter(slow)
+    begun_s = time.monotonic()
+    told = [text for state in states(1) * 200 for text in painter.show(state)]
+    assert time.monotonic() - begun_s < 1.0
+    assert told == ["the viewer can't follow: pictures are left out of it; the averages go on"]
+    painter.close()
+    assert 64 <= len(slow.drawn) < 200
+
+
+class Closed(Slow):
+    """A viewer that somebody closed."""
+
+    def draw(self, state: LiveState) -> None:  # noqa: ARG002  # nothing is drawn
+        raise OSError("it was closed")
+
+
+def test_a_viewer_that_was_closed_is_told_once() -> None:
+    painter = Painter(Closed())
+    told = []
+    for state in states(20):
+        told += painter.show(state)
+        time.sleep(0.005)
+    assert told + list(painter.close()) == ["the viewer ended: it was closed; the averages go on without it"]
