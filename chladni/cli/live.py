@@ -238,7 +238,8 @@ def _told(out: Output, state: "LiveState", book: "EventBook") -> tuple[str, ...]
 @contextmanager
 def _stopping() -> Iterator[threading.Event]:
     """Let the first Ctrl-C, SIGTERM or SIGHUP end the averages in order; a second one ends the program."""
-    stop, before = threading.Event(), {}
+    stop = threading.Event()
+    before: dict[int, Any] = {}
 
     def end(which: int, _frame: Any) -> None:
         if stop.is_set():

@@ -69,7 +69,7 @@ class Arrivals:
             position=np.concatenate(positions) if positions else None,
         )
 
-    def kept(self, keep: Mask | Whole) -> "Arrivals":
+    def kept(self, keep: Mask | Whole | slice) -> "Arrivals":
         """Give some of them, or all in another order."""
         return replace(
             self,

@@ -133,7 +133,8 @@ class ChangeWatch:
         base = self._baseline.select(moving)
         widened = replace(density.select(moving), std=density.select(moving).values * (base.std / base.values))
         found = compare_densities(base, _positive(widened, density.select(moving)), false_discovery=FALSE_DISCOVERY)
-        changes = {_key(one): one for one in (*found.peaks, *found.overall) if _counts(one)}
+        all_of_them: tuple[PeakChange | LevelChange, ...] = (*found.peaks, *found.overall)
+        changes = {_key(one): one for one in all_of_them if _counts(one)}
         again = self._before & set(changes)
         self._before = set(changes)
         if len(again) == 0:

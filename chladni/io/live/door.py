@@ -89,4 +89,8 @@ def _messages(source: str, patience_s: float | None) -> MessageSource:
         raise SetupError(f"patience of {patience_s} s must be finite and positive")
     if source == STANDARD_INPUT:
         return StandardInput(patience_s=patience_s)
+    if source.startswith(SERVER_SCHEMES):
+        from chladni.io.live.foxglove import FoxgloveServer
+
+        return FoxgloveServer(source, patience_s=patience_s)
     return FollowedFile(source, patience_s=patience_s)

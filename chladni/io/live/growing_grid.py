@@ -11,8 +11,9 @@ from chladni.io.grid_buffer import GridBuffer, grid_rows
 from chladni.io.live.reception import Told
 from chladni.io.live.stream_places import PlacedMessages, StreamPlaces
 from chladni.io.shared_grid import Group
+from chladni.signals.arrays import Whole
 from chladni.signals.channel import Channel
-from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import counted
 
 #: A stream so far behind the others is silent: the others go on without it.
@@ -170,10 +171,5 @@ class GrowingGrid:
         return (self._next - self.group.first) / self.group.rate_hz
 
 
-def _message_samples(counts: np.ndarray | None) -> float:  # type: ignore[type-arg]
+def _message_samples(counts: Whole | None) -> float:
     return 1.0 if counts is None or not counts.size else float(np.median(counts))
-
-
-def end_ns(series: TimeSeries) -> int:
-    """Time of the end of a block."""
-    return series.start_time_ns + round(series.samples / series.sample_rate_hz * NS_PER_S)

@@ -167,8 +167,7 @@ class StreamPlaces:
     def _off(self, time_ns: Whole, before: Whole) -> Real:
         """Samples by which messages are later than the next places."""
         elapsed_ns = (time_ns - self._reference_ns) - self._ahead_ns
-        off: Real = elapsed_ns / self.rate.period_ns - before
-        return off
+        return np.asarray(elapsed_ns / self.rate.period_ns - before, dtype=np.float64)
 
     def _in_line(self, piece: Piece, time_ns: Whole, sizes: Whole, off: Real) -> PlacedMessages:
         first = self.next_index + np.cumsum(sizes) - sizes

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -130,7 +130,7 @@ def _moved_sentence(change: ModeChange) -> str:
     )
 
 
-def _numbers(found: ModeSet, row: int) -> dict[str, float]:
+def _numbers(found: ModeSet, row: int) -> dict[str, Any]:
     return {
         "frequency_hz": float(found.frequency_hz[row]),
         "frequency_std_hz": float(found.frequency_std_hz[row]),
@@ -155,7 +155,7 @@ def _one(found: ModeSet, row: int) -> ModeSet:
 
 def _together(modes: Sequence[ModeSet]) -> ModeSet:
     """Single modes of the same channels as one set; they come by rising frequency."""
-    parts = {
+    parts: dict[str, Any] = {
         name: np.concatenate([getattr(one, name) for one in modes])
         for name in ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std", "shapes", "shape_std")
     }

@@ -461,7 +461,7 @@ def _resized(levels: Real, size: tuple[int, int]) -> Real:
     shown, _ = block_maximum(shown, axis=0, limit=size[1])
     rows = np.arange(size[1]) * shown.shape[0] // size[1]
     columns = np.arange(size[0]) * shown.shape[1] // size[0]
-    return shown[rows[:, np.newaxis], columns]
+    return np.asarray(shown[rows[:, np.newaxis], columns], dtype=np.float64)
 
 
 def _jpeg(picture: NDArray[Any]) -> bytes:
