@@ -32,6 +32,8 @@ _HOME = {
     "locate_from_levels": "chladni.apps.level_location",
     "live": "chladni.apps.live",
     "identify_modes": "chladni.apps.modes",
+    "ModePicking": "chladni.apps.picking",
+    "pick_modes": "chladni.apps.picking",
     "plot": "chladni.apps.plot",
     "show": "chladni.apps.show",
     "write_report": "chladni.apps.show",
@@ -248,6 +250,7 @@ __all__ = [
     "LogError",
     "Measurement",
     "ModalAssurance",
+    "ModePicking",
     "ModeSet",
     "Model",
     "ModelError",
@@ -356,6 +359,7 @@ __all__ = [
     "order_map",
     "partial_coherence",
     "phase_referenced_shape",
+    "pick_modes",
     "place_damper",
     "plot",
     "probability_density",
@@ -393,6 +397,7 @@ __all__ = [
 
 # What values call to be drawn and made into tables.
 _register(
+    pick="chladni.apps.picking",
     plot="chladni.apps.plot",
     png="chladni.apps.plot",
     summary="chladni.viewers.gap_summary",
@@ -410,6 +415,7 @@ if TYPE_CHECKING:
     from chladni.apps.level_location import LevelLocation, locate_from_levels
     from chladni.apps.live import live
     from chladni.apps.modes import identify_modes
+    from chladni.apps.picking import ModePicking, pick_modes
     from chladni.apps.plot import plot
     from chladni.apps.show import show, write_report
     from chladni.apps.spectra import frf, psd

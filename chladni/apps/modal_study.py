@@ -8,6 +8,7 @@ from typing import Literal
 
 from chladni.apps.findings import reading_sentences
 from chladni.apps.modes import Method, Wanted, functions_and_modes, modes_of_responses
+from chladni.apps.picking import ModePicking, pick_modes_of
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging
 from chladni.io.log import Log
@@ -123,6 +124,34 @@ def modal_study(
             progress=progress,
         )
     return _study(log, channels, found, response, notes=_checks(response))
+
+
+def picking_study(
+    log: Log,
+    *,
+    references: Sequence[str] | None,
+    operational: bool,
+    channels: Sequence[str] | None,
+    method: MethodName | None,
+    wanted: Wanted,
+    resolution_hz: float | None,
+    span: Span,
+    progress: Progress = no_progress,
+) -> ModePicking:
+    """Give the picking of the modes that `modal_study` would identify; arguments as there."""
+    _require_consistent(references, operational, method)
+    with _told_of(log.path):
+        return pick_modes_of(
+            log,
+            references=references,
+            responses=channels,
+            operational=operational or method in FROM_RESPONSES,
+            method=None if method is None else METHODS[method](),
+            wanted=wanted,
+            averaging=Averaging(resolution_hz=resolution_hz),
+            span=span,
+            progress=progress,
+        )
 
 
 @contextmanager

@@ -245,28 +245,67 @@ def functions_and_modes(
     EstimateError
         When no excitation is named and none can be told.
     """
+    return measured_functions(
+        source, reference, channels, wanted=wanted, averaging=averaging, span=span, progress=progress
+    ).modes(method=method, wanted=wanted)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeasuredFunctions:
+    """Frequency responses that modes are identified from.
+
+    Attributes
+    ----------
+    coarse
+        On lines as for the eye.
+    fine
+        On finer lines, which part narrow modes but lie deeper in noise; None where the lines were chosen.
+    """
+
+    coarse: FrequencyResponse
+    fine: FrequencyResponse | None = None
+
+    def modes(self, *, method: Method | None, wanted: Wanted) -> tuple[FrequencyResponse, ModeSet]:
+        """Identify modes from both, and give those that more rise from, with their functions; the finer if equal."""
+        again = modes_of_response(self.coarse, method=method, wanted=wanted)
+        if self.fine is None:
+            return self.coarse, again
+        modes = modes_of_response(self.fine, method=method, wanted=wanted)
+        hidden = again.frequency_hz.size - modes.frequency_hz.size
+        if hidden <= 0:
+            return self.fine, modes
+        apart = [f"{one.frequency_hz[1] - one.frequency_hz[0]:.3g} Hz apart" for one in (self.fine, self.coarse)]
+        told = (
+            f"on lines {apart[0]} noise hides {counted(hidden, 'mode')}; the modes are from lines {apart[1]}. "
+            "To see more of them, name every excitation or take a longer record"
+        )
+        return self.coarse, replace(again, provenance=again.provenance.with_notes(told))
+
+
+def measured_functions(
+    source: Log | TimeSeries,
+    reference: Names | None,
+    channels: Sequence[str] | None,
+    *,
+    wanted: Wanted,
+    averaging: Averaging,
+    span: Span,
+    progress: Progress = no_progress,
+) -> MeasuredFunctions:
+    """Estimate the functions that `functions_and_modes` identifies modes from."""
     named = None if reference is None else as_names(reference)
     stored = stored_functions(source, named, channels)
     if stored is not None:
         held = transfer(source, named, channels, estimator="H1", averaging=averaging, span=span)
-        response = over_hit_points(_of_one_form(held))
-        return response, modes_of_response(response, method=method, wanted=wanted)
+        return MeasuredFunctions(coarse=over_hit_points(_of_one_form(held)))
     references = excitation_names(source, span, otherwise=ALONE) if named is None else named
     coarse = _functions(source, references, channels, wanted, averaging, span, progress)
     finer = _modal_averaging(coarse, averaging)
     if finer == averaging:
-        return coarse, modes_of_response(coarse, method=method, wanted=wanted)
-    fine = _functions(source, references, channels, wanted, finer, span, no_progress)
-    modes, again = (modes_of_response(one, method=method, wanted=wanted) for one in (fine, coarse))
-    hidden = again.frequency_hz.size - modes.frequency_hz.size
-    if hidden <= 0:
-        return fine, modes
-    apart = [f"{one.frequency_hz[1] - one.frequency_hz[0]:.3g} Hz apart" for one in (fine, coarse)]
-    told = (
-        f"on lines {apart[0]} noise hides {counted(hidden, 'mode')}; the modes are from lines {apart[1]}: name every "
-        "excitation, or average longer, for surer ones"
+        return MeasuredFunctions(coarse=coarse)
+    return MeasuredFunctions(
+        coarse=coarse, fine=_functions(source, references, channels, wanted, finer, span, no_progress)
     )
-    return coarse, replace(again, provenance=again.provenance.with_notes(told))
 
 
 def _of_one_form(response: FrequencyResponse) -> FrequencyResponse:

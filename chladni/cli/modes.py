@@ -1,7 +1,7 @@
 """``chladni modes``: natural frequencies, damping, modal vectors, relative motion."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -13,6 +13,9 @@ from chladni.cli.places import require_places
 
 if TYPE_CHECKING:
     from chladni.apps.modal_study import ModalStudy
+    from chladni.apps.modes import Wanted
+    from chladni.apps.picking import ModePicking
+    from chladni.io.log import Log as OpenedLog
 
 MethodName = Literal["plscf", "circle-fit", "half-power", "ssi-cov", "fdd", "efdd"]
 
@@ -49,6 +52,11 @@ def modes(
         MethodName | None,
         typer.Option(help="plscf with an excitation, ssi-cov without, if not given.", show_default=False),
     ] = None,
+    pick: Annotated[
+        bool, typer.Option("--pick", help="Click the modes in the stabilisation chart, in the browser.")
+    ] = False,
+    port: Annotated[int, typer.Option(metavar="N", help="Port of that page; 0 takes a free one.")] = 0,
+    open_page: Annotated[bool, typer.Option("--open/--no-open", help="Open that page in the browser.")] = True,
     resolution: options.Resolution = None,
     start: options.Start = None,
     end: options.End = None,
@@ -81,18 +89,26 @@ def modes(
     )
     out = Output(json)
     wanted = Wanted.of(bands_hz=None if band is None else [band], count=count, frequencies_hz=frequency)
-    with opener(log) as opened, out.progress(log.name) as progress:
-        found = modal_study(
-            opened,
-            references=reference,
-            operational=operational,
-            channels=channel,
-            method=method,
-            wanted=wanted,
-            resolution_hz=resolution,
-            span=Span(start_s=start, end_s=end, join=join),
-            progress=progress,
-        )
+    span = Span(start_s=start, end_s=end, join=join)
+    with opener(log) as opened:
+        if pick:
+            picking = _picking(
+                out, opened, references=reference, operational=operational, channels=channel, method=method,
+                wanted=wanted, resolution_hz=resolution, span=span,
+            )  # fmt: skip
+            wanted = _kept(out, picking, wanted, port=port, open_page=open_page)
+        with out.progress(log.name) as progress:
+            found = modal_study(
+                opened,
+                references=reference,
+                operational=operational,
+                channels=channel,
+                method=method,
+                wanted=wanted,
+                resolution_hz=resolution,
+                span=span,
+                progress=progress,
+            )
     print_modes(out, found.modes, found.validation)
     print_relative_motion(out, found.modes, found.study.relative_motion)
     out.lines(found.study.findings)
@@ -100,6 +116,37 @@ def modes(
     out.pictures(found.study, figures=figures, report=report)
     motions, passed_on = found.study.relative_motion, found.transmissibility
     out.json(modes_document(found.modes, found.validation, motions, passed_on))
+
+
+def _picking(
+    out: Output, log: "OpenedLog", *, references: list[str] | None, channels: list[str] | None, **options: Any
+) -> "ModePicking":
+    from chladni.apps.modal_study import picking_study
+
+    with out.progress(log.path.name) as progress:
+        return picking_study(log, references=references, channels=channels, progress=progress, **options)
+
+
+def _kept(out: Output, picking: "ModePicking", wanted: "Wanted", *, port: int, open_page: bool) -> "Wanted":
+    """Serve the page until the selection is kept, and ask for just these modes."""
+    from dataclasses import replace
+
+    from chladni.apps.picking import open_picking
+
+    server = open_picking(picking, port=port)
+
+    def tell() -> None:
+        out.line(f"{server.address}modes")
+        out.line("Only this computer can reach this address. Keep the modes there, or end with Ctrl-C.")
+        if open_page:
+            import webbrowser
+
+            webbrowser.open(f"{server.address}modes")
+
+    server.run(tell)
+    listed = " ".join(f"--frequency {one:g}" for one in picking.frequencies_hz)
+    out.line(f"The same modes again: {listed}")
+    return replace(wanted, count=None, frequencies_hz=picking.frequencies_hz)
 
 
 def _write(out: Output, found: "ModalStudy", *, uff: Path | None, csv: Path | None, save: Path | None) -> None:

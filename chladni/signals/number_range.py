@@ -18,6 +18,8 @@ SMALLEST, LARGEST = 2.0**-200, 2.0**200
 SMALLEST_OF_MODEL, LARGEST_OF_MODEL = 2.0**-340, 2.0**340
 
 Runs = Sequence[tuple[int, int]]
+# Samples of each channel looked at twice in a row: so many stay in the cache between.
+SAMPLES_AT_ONCE = 1 << 14
 
 
 def largest_magnitudes(values: NDArray[np.floating], runs: Runs | None = None) -> Real:
@@ -32,8 +34,8 @@ def largest_magnitudes(values: NDArray[np.floating], runs: Runs | None = None) -
     """
     found = np.zeros(len(values))
     for first, last in [(0, values.shape[1])] if runs is None else runs:
-        part = values[:, first:last]
-        if part.size:
+        for start in range(first, last, SAMPLES_AT_ONCE):
+            part = values[:, start : min(start + SAMPLES_AT_ONCE, last)]
             # Two passes without a copy: the magnitudes of a gigabyte would be another one.
             np.maximum(found, np.maximum(part.max(axis=1), -part.min(axis=1)), out=found)
     return found

@@ -1,12 +1,13 @@
 """Poles over model orders, as an analyst looks at them."""
 
 from dataclasses import dataclass, replace
-from typing import Literal, Self, get_args
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
 from chladni.signals.arrays import Index, Real, Whole
 from chladni.signals.errors import EstimateError
+from chladni.signals.outlets import outlet
 from chladni.signals.value import Value, require_frequency_axis, require_shape
 
 PoleStatus = Literal["new", "frequency", "damping", "vector"]
@@ -57,3 +58,20 @@ class StabilisationDiagram(Value):
         """Give the same poles with the numbers that some modes have when only those are kept, in the order given."""
         numbers = {int(row): number for number, row in enumerate(rows)}
         return replace(self, mode=np.array([numbers.get(int(row), -1) for row in self.mode], dtype=np.int64))
+
+    def pick(self, source: Any, **options: Any) -> Any:
+        """Pick modes by clicking at poles, in a notebook; it begins with the modes that were taken from this diagram.
+
+        Parameters
+        ----------
+        source
+            What the modes were identified from: frequency responses, a series, a log or the path to one.
+        options
+            As `identify_modes` was given them, such as ``band_hz=``.
+
+        Returns
+        -------
+        ModePicking
+            See `chladni.pick_modes`; ``.modes`` holds what is picked, ``.frequencies_hz`` the list that repeats it.
+        """
+        return outlet("pick")(self, source, **options)

@@ -131,6 +131,14 @@ class CovarianceDrivenSubspace:
         (2008) and Doehler & Mevel (2013), not below what a record of this length allows (Au 2014).
         """
         require_request(count, frequencies_hz, band_hz)
+        return self.prepare(source, band_hz=band_hz).identify(count=count, frequencies_hz=frequencies_hz)
+
+    def prepare(self, source: Source, *, band_hz: Band | None = None) -> "SubspaceModels":
+        """Read the responses and solve the models of all orders; modes are then chosen from them, as often as wanted.
+
+        See `identify` for the arguments and the errors.
+        """
+        require_request(None, None, band_hz)
         record = open_record(source)
         spectra = lead_spectra(record, band_hz)
         plan = plan_subspace(
@@ -143,25 +151,14 @@ class CovarianceDrivenSubspace:
             band_hz=band_hz,
         )
         correlations, spectra = read_record(record, spectra, plan)
-        poles = _solve(correlations, plan)
-        harmonics = _harmonics(record, plan.band_hz)
-        chosen = choose_poles(
-            correlations,
-            poles.table,
-            block_rows=plan.block_rows,
-            band_hz=plan.band_hz,
-            harmonics=harmonics,
-            count=count,
-            frequencies_hz=frequencies_hz,
-            selection=self.selection,
-            rules=self.rules,
-        )
-        modes = _mode_set(correlations, poles, chosen)
-        return replace(
-            modes,
-            harmonics=harmonics,
-            stabilisation=_diagram(poles.table, chosen, spectra, self.stability),
-            provenance=_provenance(correlations, record, plan, chosen),
+        return SubspaceModels(
+            method=self,
+            record=record,
+            plan=plan,
+            correlations=correlations,
+            spectra=spectra,
+            poles=_solve(correlations, plan),
+            harmonics=_harmonics(record, plan.band_hz),
         )
 
 
@@ -179,6 +176,40 @@ class _Poles:
         place = int(np.searchsorted(ends, row, side="right"))
         model = self.models[place]
         return model, row - ends[place] + model.kept.size
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SubspaceModels:
+    """Models of all orders of one record, and all that is told of the modes chosen from them."""
+
+    method: CovarianceDrivenSubspace
+    record: ResponseRecord
+    plan: SubspacePlan
+    correlations: CorrelationFunctions
+    spectra: CrossSpectra
+    poles: _Poles
+    harmonics: tuple[MachineHarmonic, ...]
+
+    def identify(self, *, count: int | None = None, frequencies_hz: Sequence[float] | None = None) -> ModeSet:
+        """Choose modes, as `CovarianceDrivenSubspace.identify` does."""
+        require_request(count, frequencies_hz, None)
+        chosen = choose_poles(
+            self.correlations,
+            self.poles.table,
+            block_rows=self.plan.block_rows,
+            band_hz=self.plan.band_hz,
+            harmonics=self.harmonics,
+            count=count,
+            frequencies_hz=frequencies_hz,
+            selection=self.method.selection,
+            rules=self.method.rules,
+        )
+        return replace(
+            _mode_set(self.correlations, self.poles, chosen),
+            harmonics=self.harmonics,
+            stabilisation=_diagram(self.poles.table, chosen, self.spectra, self.method.stability),
+            provenance=_provenance(self.correlations, self.record, self.plan, chosen),
+        )
 
 
 def _solve(correlations: CorrelationFunctions, plan: SubspacePlan) -> _Poles:

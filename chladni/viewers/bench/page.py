@@ -1,4 +1,4 @@
-"""A whole page around an instrument: heading, look, life of the session."""
+"""A whole page around an instrument or a picking: heading, look, life of the session."""
 
 import re
 from collections.abc import Callable
@@ -10,11 +10,15 @@ from bokeh.themes import Theme as ChartTheme
 from jinja2 import Template
 
 from chladni.models.core.instrument import Instrument
+from chladni.signals.visible import visible
 from chladni.viewers.bench.instrument_page import InstrumentPage, heading
 from chladni.viewers.bench.parts import column, html, pn
+from chladni.viewers.bench.picked import Picking
+from chladni.viewers.bench.picking_page import PickingPage
 from chladni.viewers.bench.theme import FONT, Ground, theme
 from chladni.viewers.bench.tile import TICK_JS
 from chladni.viewers.bench.tools import Tools
+from chladni.viewers.bench.words import escape
 
 _FRAME_CSS = """
 :host {
@@ -78,19 +82,46 @@ def page_maker(
     """Give the function that makes a page for each visitor."""
 
     def make() -> Any:
-        document = curdoc()
-        # In the address, so that a reload and a bookmark keep it.
-        ground = wanted_ground(pn.state.session_args.get("theme", []))
-        # Inside the page's function: the look belongs to this document, not to the program.
-        document.theme = ChartTheme(json=theme(ground).of_charts())
-        document.template = _PAGE
-        document.template_variables.update(heading=f"{instrument.title} · chladni", addresses=script_addresses)
+        document, ground = dressed(instrument.title)
         page = InstrumentPage(instrument, tools, document=document, ground=ground, log=log, variants=variants)
         # Threads and private files end with the page.
         document.on_session_destroyed(lambda _context: page.close())
-        return framed(page, instrument, ground)
+        return framed(page.view(), heading(instrument, ground), ground)
 
     return make
+
+
+def picking_maker(picking: Picking, keep: Callable[[], None]) -> Callable[[], Any]:
+    """Give the function that makes the page of a picking for each visitor; `keep` is called when it's kept."""
+
+    def make() -> Any:
+        document, ground = dressed(f"Modes of {picking.title}")
+        page = PickingPage(picking, document=document, ground=ground, keep=keep)
+        document.on_session_destroyed(lambda _context: page.close())
+        return framed(page.view(), picking_heading(picking, ground), ground)
+
+    return make
+
+
+def picking_heading(picking: Picking, ground: Ground) -> str:
+    """Give the line above a picking: name, other ground, and who can reach it."""
+    other = theme(ground).other
+    return (
+        f'<div class="head"><h1>Modes of {escape(picking.title)}</h1><span class="grow"></span>'
+        f'<span>only this computer can reach this page</span><a href="?theme={other}">{other}</a></div>'
+    )
+
+
+def dressed(title: str) -> tuple[Any, Ground]:
+    """Give the document of the page that is being made, with look and title, and the ground that was asked for."""
+    document = curdoc()
+    # In the address, so that a reload and a bookmark keep it.
+    ground = wanted_ground(pn.state.session_args.get("theme", []))
+    # Inside the page's function: the look belongs to this document, not to the program.
+    document.theme = ChartTheme(json=theme(ground).of_charts())
+    document.template = _PAGE
+    document.template_variables.update(heading=f"{visible(title)} · chladni", addresses=script_addresses)
+    return document, ground
 
 
 def script_addresses(tags: str) -> list[str]:
@@ -103,9 +134,8 @@ def wanted_ground(words: list[bytes]) -> Ground:
     return "dark" if words[:1] == [b"dark"] else "light"
 
 
-def framed(page: InstrumentPage, instrument: Instrument, ground: Ground) -> Any:
-    """Put heading and look around a page."""
+def framed(view: Any, head: str, ground: Ground) -> Any:
+    """Put heading and look around the parts of a page."""
     # On the outermost part and not on the document: in a notebook the rest isn't ours.
     look = _FRAME_CSS.replace("VARIABLES", theme(ground).variables()).replace("FONT", FONT)
-    head = html(heading(instrument, ground), _HEAD_CSS, margin=(0, 0, 8, 0))
-    return column(head, page.view(), sizing_mode="stretch_both", stylesheets=[look])
+    return column(html(head, _HEAD_CSS, margin=(0, 0, 8, 0)), view, sizing_mode="stretch_both", stylesheets=[look])
