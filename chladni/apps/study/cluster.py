@@ -124,7 +124,9 @@ def _of_this_machine(workers: int | None, *, dashboard: bool) -> "Iterator[Clien
             processes=True,
             host=LOOPBACK,
             security=_own_keys(),
-            dashboard_address=f"{LOOPBACK}:0" if dashboard else None,
+            # Without a dashboard Dask serves its metrics all the same, and by itself to the whole network.
+            dashboard_address=f"{LOOPBACK}:0",
+            scheduler_kwargs={"dashboard": dashboard},
             local_directory=folder,
             silence_logs=logging.CRITICAL,
             # A log is bounded by its reader, not by half a machine.

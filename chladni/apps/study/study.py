@@ -14,9 +14,12 @@ from chladni.io.study.recipe import Recipe
 from chladni.io.study.tables import packed, tables_of
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from distributed import Client
 
 Progress = Callable[[float], None]
+Connect = Callable[[], "AbstractContextManager[Client]"]
 #: Between two times that what is done is put into the tables, at least.
 SETTLE_EVERY_S: Final = 30.0
 
@@ -55,7 +58,7 @@ def run_study(
     logs: Sequence[str] | Sequence[LogAddress],
     out: Path | str,
     *,
-    client: "Client",
+    connect: Connect,
     progress: Progress = lambda _share: None,
 ) -> StudyReport:
     """Do what a recipe says with each log whose rows aren't there yet.
@@ -68,8 +71,8 @@ def run_study(
         Files, folders and addresses, see `chladni.io.study.logs.find_logs`, or what that found.
     out
         Folder of the results; made, or gone on with.
-    client
-        See `chladni.apps.study.cluster.cluster`.
+    connect
+        Gives a client of workers, see `chladni.apps.study.cluster.cluster`; asked when there is something to do.
     progress
         Called with the share done, 0 to 1.
 
@@ -87,7 +90,8 @@ def run_study(
         waiting = [one for one in addresses if not _is_done(folder, one)]
         report = StudyReport(logs=len(addresses), there=len(addresses) - len(waiting))
         if waiting:
-            _run(Engine(client, partial(work_on, text)), folder, waiting, report, progress)
+            with connect() as client:
+                _run(Engine(client, partial(work_on, text)), folder, waiting, report, progress)
         folder.settle()
     return report
 

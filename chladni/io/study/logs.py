@@ -2,11 +2,13 @@
 
 import hashlib
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
+from threading import Thread
 from typing import Any, BinaryIO, Final
 
 from chladni.io.files.formats import FILE_SUFFIXES, MCAP
@@ -15,6 +17,9 @@ from chladni.signals.errors import LogError, SetupError
 from chladni.signals.visible import visible
 
 _PIECE_BYTES: Final = 1 << 22
+#: A store that sends nothing for so long is taken for dead.
+STALL_S: Final = 60.0
+_LOOK_EVERY_S: Final = 0.02
 
 
 class StoreError(LogError):
@@ -197,8 +202,9 @@ def held(address: LogAddress) -> Iterator[HeldLog]:
     path = Path(address.url)
     with open_regular(path, LogError) as file:
         before = _stamp(os.fstat(file.fileno()))
-        content, size = _copied(file, None)
-    yield HeldLog(path=path, content=content, size_bytes=size)
+        copy = _Copy()
+        copy.run(file)
+    yield HeldLog(path=path, content=copy.digest.hexdigest(), size_bytes=copy.size)
     if _stamp(path.stat()) != before:
         raise StoreError(f"{address.told}: changed while it was read; run again when its recorder has closed it")
 
@@ -207,20 +213,52 @@ def _fetched(address: LogAddress, folder: Path) -> HeldLog:
     system, inside = _store(address.url)
     # The name is kept: messages tell it, and its end tells the kind.
     path = folder / (PurePosixPath(inside.rstrip("/")).name.partition("?")[0] or "log.mcap")
+    copy = _Copy(target=path)
     try:
-        with system.open(inside, "rb") as source, path.open("wb") as target:
-            content, size = _copied(source, target)
+        copy.run_unless_stalled(lambda: system.open(inside, "rb"))
     except Exception as error:
         # Stores raise whatever their libraries do; a log that can't be fetched is told, and tried again.
         raise _unreachable(address.url, error) from error
-    return HeldLog(path=path, content=content, size_bytes=size)
+    return HeldLog(path=path, content=copy.digest.hexdigest(), size_bytes=copy.size)
 
 
-def _copied(source: BinaryIO, target: BinaryIO | None) -> tuple[str, int]:
-    digest, size = hashlib.sha256(), 0
-    while piece := source.read(_PIECE_BYTES):
-        digest.update(piece)
-        size += len(piece)
-        if target is not None:
-            target.write(piece)
-    return digest.hexdigest(), size
+@dataclass(slots=True, kw_only=True)
+class _Copy:
+    """Reads a file from its start to its end, with the hash of its content; into another file where one is given."""
+
+    target: Path | None = None
+    digest: Any = field(default_factory=hashlib.sha256)
+    size: int = 0
+    _error: BaseException | None = None
+
+    def run(self, source: BinaryIO) -> None:
+        """Read all of it."""
+        with nullcontext() if self.target is None else self.target.open("wb") as target:
+            while piece := source.read(_PIECE_BYTES):
+                self.digest.update(piece)
+                self.size += len(piece)
+                if target is not None:
+                    target.write(piece)
+
+    def run_unless_stalled(self, opening: Callable[[], AbstractContextManager[BinaryIO]]) -> None:
+        """Read all of it, unless nothing comes for `STALL_S`: stores have time limits of their own, or none."""
+
+        def work() -> None:
+            try:
+                with opening() as source:
+                    self.run(source)
+            except BaseException as error:  # noqa: BLE001  # it's raised where it's waited for
+                self._error = error
+
+        # Not waited for when this process ends: what hangs may hang for ever.
+        thread = Thread(target=work, daemon=True, name="chladni-fetch")
+        thread.start()
+        known, since_s = -1, time.monotonic()
+        while thread.is_alive():
+            thread.join(_LOOK_EVERY_S)
+            if self.size != known:
+                known, since_s = self.size, time.monotonic()
+            elif time.monotonic() - since_s > STALL_S:
+                raise TimeoutError(f"nothing came for {STALL_S:g} s")
+        if self._error is not None:
+            raise self._error

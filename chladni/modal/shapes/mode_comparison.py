@@ -45,7 +45,7 @@ def compare_modes(before: ModeSet, after: ModeSet, *, false_alarm: float = FALSE
     Pairs are those that cost least in all (Kuhn 1955): the distance in frequency over a tenth of it, plus 1 - MAC.
     """
     likeness = cross_mac(before, after)
-    pairs = _pairs(before, after, likeness)
+    pairs = cheapest_pairs(before.frequency_hz, after.frequency_hz, likeness)
     limit = float(-ndtri(false_alarm / (4 * max(len(pairs), 1))))
     found = [_paired(before, after, one, other, float(likeness[one, other]), limit) for one, other in pairs]
     gone = sorted(set(range(before.frequency_hz.size)) - {one for one, _ in pairs})
@@ -55,11 +55,22 @@ def compare_modes(before: ModeSet, after: ModeSet, *, false_alarm: float = FALSE
     return tuple(sorted(found, key=_place))
 
 
-def _pairs(before: ModeSet, after: ModeSet, likeness: Real) -> list[tuple[int, int]]:
-    apart = np.abs(before.frequency_hz[:, np.newaxis] / after.frequency_hz - 1)
-    possible = (apart <= FARTHEST) & (likeness >= LEAST_MAC)
+def cheapest_pairs(
+    before_hz: Real, after_hz: Real, likeness: Real, *, farthest: float = FARTHEST, least_mac: float = LEAST_MAC
+) -> list[tuple[int, int]]:
+    """Pair modes by frequencies and the MAC of their shapes ``[before, after]``, at least cost in all.
+
+    Parameters
+    ----------
+    farthest
+        Share of its frequency by which a mode may move.
+    least_mac
+        Of a pair.
+    """
+    apart = np.abs(before_hz[:, np.newaxis] / after_hz - 1)
+    possible = (apart <= farthest) & (likeness >= least_mac)
     # More than all possible pairs together: an impossible one is only taken for want of any other.
-    cost = np.where(possible, apart / FARTHEST + 1 - likeness, 3.0 * (1 + max(likeness.shape, default=1)))
+    cost = np.where(possible, apart / farthest + 1 - likeness, 3.0 * (1 + max(likeness.shape, default=1)))
     rows, columns = linear_sum_assignment(cost)
     return [(int(one), int(other)) for one, other in zip(rows, columns, strict=True) if possible[one, other]]
 

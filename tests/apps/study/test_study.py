@@ -2,6 +2,8 @@
 
 import shutil
 from collections.abc import Iterator
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +43,13 @@ def client() -> Iterator[Any]:
     from distributed import Client, LocalCluster
 
     with (
-        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+        LocalCluster(
+            n_workers=1,
+            threads_per_worker=1,
+            processes=False,
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+        ) as cluster,
         Client(cluster) as client,
     ):
         yield client
@@ -68,7 +76,7 @@ def recipe(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def found(client: Any, logs: Path, recipe: Path, tmp_path_factory: pytest.TempPathFactory) -> "chladni.StudyResults":
     out = tmp_path_factory.mktemp("study") / "out"
-    report = run_study(load_recipe(recipe), [str(logs)], out, client=client)
+    report = run_study(load_recipe(recipe), [str(logs)], out, connect=partial(nullcontext, client))
     assert (report.logs, report.done, report.there) == (5, 5, 0)
     return chladni.results(out)
 
@@ -138,23 +146,23 @@ def test_a_study_that_is_begun_again_does_what_is_new_alone(
     folder, out = tmp_path / "logs", tmp_path / "out"
     shutil.copytree(logs, folder)
     loaded = load_recipe(recipe)
-    whole = run_study(loaded, [str(folder)], tmp_path / "whole", client=client)
+    whole = run_study(loaded, [str(folder)], tmp_path / "whole", connect=partial(nullcontext, client))
     assert whole.done == 5
-    assert run_study(loaded, [str(folder / "run0.mcap")], out, client=client).done == 1
-    again = run_study(loaded, [str(folder)], out, client=client)
+    assert run_study(loaded, [str(folder / "run0.mcap")], out, connect=partial(nullcontext, client)).done == 1
+    again = run_study(loaded, [str(folder)], out, connect=partial(nullcontext, client))
     # The text without numbers was read, and says the same as ever: it isn't tried again.
     assert (again.there, again.done) == (1, 4)
     assert files(out) == files(tmp_path / "whole")
-    last = run_study(loaded, [str(folder)], out, client=client)
+    last = run_study(loaded, [str(folder)], out, connect=partial(nullcontext, client))
     assert (last.there, last.done, last.unchanged) == (5, 0, 0)
     # Written anew with the same content: read, and found to be known.
     content = (folder / "run1.mcap").read_bytes()
     (folder / "run1.mcap").write_bytes(content)
-    touched = run_study(loaded, [str(folder)], out, client=client)
+    touched = run_study(loaded, [str(folder)], out, connect=partial(nullcontext, client))
     assert (touched.there, touched.done, touched.unchanged) == (4, 0, 1)
     # Another content of the same name: its old rows go, from the old day, too.
     write_log(folder / "run1.mcap", seed=9, start_ns=START_NS + 5 * DAY_NS)
-    assert run_study(loaded, [str(folder)], out, client=client).done == 1
+    assert run_study(loaded, [str(folder)], out, connect=partial(nullcontext, client)).done == 1
     [row] = rows(chladni.results(out), "logs", folder / "run1.mcap")
     assert str(row["day"]) == "2023-11-19"
     assert {row["day"] for row in rows(chladni.results(out), "peaks", folder / "run1.mcap")} == {row["day"]}
@@ -180,9 +188,9 @@ def test_what_a_crash_left_in_the_journal_is_in_the_tables_afterwards(
     with monkeypatch.context() as patch:
         patch.setattr(StudyFolder, "_rewrite_day", die)
         with pytest.raises(Killed):
-            run_study(loaded, [str(logs)], out, client=client)
+            run_study(loaded, [str(logs)], out, connect=partial(nullcontext, client))
     assert not list(out.glob("logs/*/*.parquet"))
-    again = run_study(loaded, [str(logs)], out, client=client)
+    again = run_study(loaded, [str(logs)], out, connect=partial(nullcontext, client))
     # Stamps were lost with the crash: the logs are read, and found to be what was done.
     assert again.done == 0
     assert len(chladni.results(out).table("logs")) == 5
@@ -193,11 +201,11 @@ def test_a_folder_belongs_to_one_recipe(client: Any, found: "chladni.StudyResult
     other = tmp_path / "other.toml"
     other.write_text(RECIPE.replace("2.0", "4.0"))
     with pytest.raises(SetupError, match="holds results of another recipe"):
-        run_study(load_recipe(other), [str(tmp_path / "no.mcap")], found.path, client=client)
+        run_study(load_recipe(other), [str(tmp_path / "no.mcap")], found.path, connect=partial(nullcontext, client))
     # How results are followed decides no row.
     followed = tmp_path / "followed.toml"
     followed.write_text(RECIPE + "[trend]\nleast_mac = 0.9\n")
-    run_study(load_recipe(followed), [], found.path, client=client)
+    run_study(load_recipe(followed), [], found.path, connect=partial(nullcontext, client))
 
 
 def test_logs_come_out_of_any_store(client: Any, recipe: Path, logs: Path, tmp_path: Path) -> None:
@@ -207,9 +215,9 @@ def test_logs_come_out_of_any_store(client: Any, recipe: Path, logs: Path, tmp_p
     store.pipe("/bridge/read.me", b"no log")
     addresses = find_logs(["memory://bridge/*.mcap", "memory://bridge"])
     assert [one.url for one in addresses] == ["memory://bridge/run1.mcap"]
-    run_study(load_recipe(recipe), addresses, tmp_path / "out", client=client)
+    run_study(load_recipe(recipe), addresses, tmp_path / "out", connect=partial(nullcontext, client))
     stored = chladni.results(tmp_path / "out")
-    run_study(load_recipe(recipe), [str(logs / "run1.mcap")], tmp_path / "disk", client=client)
+    run_study(load_recipe(recipe), [str(logs / "run1.mcap")], tmp_path / "disk", connect=partial(nullcontext, client))
     disk = chladni.results(tmp_path / "disk")
     for table in ("channels", "peaks", "modes", "documents", "findings"):
         assert stored.table(table).drop_columns("log").equals(disk.table(table).drop_columns("log"))
@@ -221,9 +229,9 @@ def test_a_store_that_is_gone_is_a_row_and_tried_again(client: Any, recipe: Path
     store.pipe("/fleet/run1.mcap", (logs / "run1.mcap").read_bytes())
     addresses = find_logs(["memory://fleet/run1.mcap"])
     store.rm("/fleet/run1.mcap")
-    first = run_study(load_recipe(recipe), addresses, tmp_path / "out", client=client)
+    first = run_study(load_recipe(recipe), addresses, tmp_path / "out", connect=partial(nullcontext, client))
     assert [(step, "can't be reached" in why) for _, step, why in first.failures] == [("read", True)]
     store.pipe("/fleet/run1.mcap", (logs / "run1.mcap").read_bytes())
-    second = run_study(load_recipe(recipe), addresses, tmp_path / "out", client=client)
+    second = run_study(load_recipe(recipe), addresses, tmp_path / "out", connect=partial(nullcontext, client))
     assert (second.done, second.failures) == (1, [])
     assert not len(chladni.results(tmp_path / "out").table("failures"))

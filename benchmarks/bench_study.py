@@ -1,0 +1,177 @@
+"""Studies of many logs: overhead, memory, speed of two workers, questions, kills, and scaling to 64 workers.
+
+``python benchmarks/bench_study.py overhead --logs 10000`` (and ``speed``, ``query``, ``kills``, ``scale``). Each
+prints a Markdown table. Overhead is told twice. By the clock, it's the time of two workers less what their logs took.
+By processor time, it's that of client, scheduler and workers, less what the logs took; others don't change it.
+"""
+
+import argparse
+import json
+import os
+import random
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from study_logs import REAL, SHORT, chladni, own_cluster, tables, watched, write_logs
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+
+def study(folder: Path, recipe: str, out: str, *words: object) -> tuple[dict[str, float], float, float, float]:
+    """Run a study: its report, seconds by the clock, the client's largest memory in MB, processor time of all."""
+    (folder / "recipe.toml").write_text(recipe)
+    target = folder / f"{out}.json"
+    began_s = time.perf_counter()
+    command = chladni(
+        "study", folder / "recipe.toml", folder / "logs", "--out", folder / out, "--json", target, *words
+    )
+    with watched(command) as (process, usage):
+        pass
+    took_s = time.perf_counter() - began_s
+    assert process.returncode == 0, process.returncode
+    return json.loads(target.read_text()), took_s, usage.client_mb, sum(usage.cpu_s.values())
+
+
+def overhead(folder: Path, logs: int) -> None:
+    """10 000 one-second logs on two workers: what the engine adds to each."""
+    write_logs(folder / "logs", logs, seconds=1.0)
+    report, took_s, client_mb, cpu_s = study(folder, SHORT, "out", "--workers", 2)
+    assert report["done"] == logs, report
+    assert not report["failures"]
+    print(
+        "| logs | seconds | client [MB] | work a log [ms] | overhead: by the clock [ms] | by processor [ms] | load |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    clock_ms = (2 * took_s - report["seconds"]) / logs * 1e3
+    processor_ms = (cpu_s - report["cpu_s"]) / logs * 1e3
+    work_ms = report["cpu_s"] / logs * 1e3
+    print(
+        f"| {logs} | {took_s:.0f} | {client_mb:.0f} | {work_ms:.1f} | {clock_ms:.1f} | {processor_ms:.1f} "
+        f"| {os.getloadavg()[0]:.1f} |"
+    )
+    query(folder / "out")
+
+
+def query(out: Path) -> None:
+    """Time of questions to the table of a study, in one program that has it open."""
+    import chladni
+
+    found = chladni.results(out)
+    print("\n| question | rows | first [ms] | median of 20 [ms] |\n| --- | --- | --- | --- |")
+    for sql in (
+        "select status, count(*) as n from logs group by status",
+        "select channel, avg(rms) as rms from levels group by channel",
+        "select * from peaks where rank = 1 and step = 'psd'",
+        "select l.day, count(*) as n from logs l join channels c using (log) group by l.day",
+    ):
+        seconds = []
+        for _ in range(21):
+            began_s = time.perf_counter()
+            answer = found.query(sql)
+            seconds.append(time.perf_counter() - began_s)
+        print(f"| `{sql}` | {answer.num_rows} | {seconds[0] * 1e3:.0f} | {sorted(seconds[1:])[10] * 1e3:.0f} |")
+
+
+def speed(folder: Path, logs: int) -> None:
+    """Real work on one worker and on two, in turn."""
+    write_logs(folder / "logs", logs, seconds=60.0, distinct=logs)
+    times: dict[int, list[float]] = {1: [], 2: []}
+    for place in range(3):
+        for workers in (1, 2):
+            _, took_s, _, _ = study(folder, REAL, f"out{place}{workers}", "--workers", workers)
+            times[workers].append(took_s)
+    print(
+        "| logs of 60 s | one worker [s] | two [s] | ratio of the fastest | load |\n| --- | --- | --- | --- | --- |"
+    )
+    one, two = (", ".join(f"{took:.1f}" for took in times[workers]) for workers in (1, 2))
+    print(f"| {logs} | {one} | {two} | {min(times[1]) / min(times[2]):.2f} | {os.getloadavg()[0]:.1f} |")
+
+
+def kills(folder: Path, runs: int, logs: int, seed: int) -> None:
+    """End client, worker and scheduler in turn at random moments, begin again, and compare the tables."""
+    write_logs(folder / "logs", logs, seconds=20.0, distinct=logs)
+    study(folder, REAL, "whole", "--workers", 2)
+    expected, rng = tables(folder / "whole"), random.Random(seed)  # noqa: S311  # no secret
+    print("| run | ended | after [s] | said | begun again | same tables |\n| --- | --- | --- | --- | --- | --- |")
+    wrong = 0
+    with own_cluster(18786, 2, folder) as cluster:
+        for run in range(runs):
+            victim = ("client", "worker", "scheduler")[run % 3]
+            out, after_s = folder / f"run{run}", rng.uniform(2.0, 12.0)
+            words = ("study", folder / "recipe.toml", folder / "logs", "--out", out, "--scheduler", cluster.address)
+            process = subprocess.Popen(chladni(*words), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            time.sleep(after_s)
+            {"client": process, "worker": cluster.others[0], "scheduler": cluster.scheduler}[victim].kill()
+            time.sleep(1)
+            cluster.keep()
+            _, said = process.communicate(timeout=400)
+            again = 0
+            while tables(out) != expected and again < 3:
+                again += 1
+                subprocess.run(chladni(*words), check=False, timeout=400, capture_output=True)
+                cluster.keep()
+            same = tables(out) == expected
+            wrong += not same
+            told = said.decode().strip()[-90:] or f"exit {process.returncode}"
+            print(f"| {run} | {victim} | {after_s:.1f} | {told} | {again} | {'yes' if same else 'NO'} |", flush=True)
+    print(f"\n{runs - wrong} of {runs} the same")
+    raise SystemExit(bool(wrong))
+
+
+def nap(items: list[float]) -> bytes:
+    """Work that takes no processor: so many workers as one likes on any machine."""
+    time.sleep(sum(items))
+    return b"x" * 2000 * len(items)
+
+
+def scale(seconds: float, logs: int) -> None:
+    """Sleeping logs on 1 to 64 workers: how much of their time is sleep, and what a batch costs the scheduler."""
+    from distributed import Client, LocalCluster
+
+    print("| workers | batches | a batch [s] | seconds | ideal [s] | share of ideal | a batch costs [ms] |")
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    for workers in (1, 4, 16, 64):
+        threads = {"processes": False, "dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
+        with LocalCluster(n_workers=workers, threads_per_worker=1, **threads) as local, Client(local) as client:
+            for batch_s in (2.0, 0.2):
+                print(row(client, workers, batch_s, seconds, logs * workers), flush=True)
+
+
+def row(client: "Client", workers: int, batch_s: float, seconds: float, count: int) -> str:
+    """Measure one row of `scale`."""
+    from chladni.apps.study.engine import Engine
+
+    engine = Engine(client, nap, batch_s=batch_s)
+    engine.note_seconds(seconds)
+    began_s, began_cpu = time.perf_counter(), time.process_time()
+    batches = sum(1 for _ in engine.run([seconds] * count))
+    took_s, ideal_s = time.perf_counter() - began_s, count * seconds / workers
+    cost_ms = (time.process_time() - began_cpu) / batches * 1e3
+    share = ideal_s / took_s
+    return f"| {workers} | {batches} | {batch_s} | {took_s:.1f} | {ideal_s:.1f} | {share:.2f} | {cost_ms:.1f} |"
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=["overhead", "speed", "query", "kills", "scale"])
+    parser.add_argument("--logs", type=int)
+    parser.add_argument("--runs", type=int, default=30)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path, help="of query: the folder of a study")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="bench-study-") as name:
+        match given.what:
+            case "overhead":
+                overhead(Path(name), given.logs or 10_000)
+            case "speed":
+                speed(Path(name), given.logs or 24)
+            case "query":
+                query(given.out)
+            case "kills":
+                kills(Path(name), given.runs, given.logs or 24, given.seed)
+            case "scale":
+                scale(0.05, given.logs or 200)
