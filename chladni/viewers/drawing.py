@@ -1,5 +1,6 @@
 """Preparation of numbers for drawing: decibels, envelopes, breaks in lines, ticks. Nothing here is an estimate."""
 
+from collections.abc import Sequence
 from math import ceil, floor, log10
 from typing import Any
 
@@ -7,6 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.arrays import Index, Mask, Real
+
+# Share of all cells of a waterfall below the lowest colour and below the highest.
+COLOURED_PERCENT = (5.0, 99.8)
+LEAKING_LINES = 3
 
 
 def decibels_of_power(power: NDArray[np.floating]) -> Real:
@@ -95,6 +100,30 @@ def level_limits(level_db: Real) -> tuple[float, float]:
     low, high = max(float(known.min()), float(known.max()) - 100), float(known.max())
     room = max(0.05 * (high - low), (20 - (high - low)) / 2)
     return low - room, high + room
+
+
+def colour_range(levels: Sequence[Real], *, most_db: float) -> tuple[float, float]:
+    """Choose the decibels that colours run over, one scale for all: what most of the cells hold.
+
+    A few cells outside have the colour of the end: the lines beside 0 Hz, where a trend leaks, would take all colours
+    for themselves otherwise.
+
+    Parameters
+    ----------
+    levels
+        ``[slice, line]`` each, in dB; NaN where nothing is known.
+    most_db
+        Longest range, below its upper end.
+    """
+    # The line at 0 Hz and the two beside it hold what a window leaks of the mean and of a trend.
+    judged = [level[:, LEAKING_LINES:] if level.shape[1] > 2 * LEAKING_LINES else level for level in levels]
+    known = np.concatenate([level[np.isfinite(level)] for level in judged])
+    if known.size == 0:
+        return -most_db, 0.0
+    low, high = (float(end) for end in np.percentile(known, COLOURED_PERCENT))
+    # Of silence with one tone nearly every cell is the same.
+    high = max(high, float(known.max()) - most_db / 2)
+    return max(low, high - most_db), high
 
 
 def line_breaks(frequency_hz: Real) -> Index:

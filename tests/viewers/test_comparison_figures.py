@@ -56,7 +56,8 @@ def response_comparison() -> ResponseComparison:
 
 def marked_hz(axes: Axes) -> list[float]:
     (line,) = [line for line in axes.lines if line.get_label() == "more than scatter explains"]
-    return np.asarray(line.get_xdata(), dtype=np.float64).tolist()
+    x, y = (np.asarray(points, dtype=np.float64) for points in (line.get_xdata(), line.get_ydata()))
+    return x[np.isfinite(y)].tolist()
 
 
 def test_each_channel_has_its_change_its_band_and_its_significant_lines() -> None:
@@ -72,6 +73,15 @@ def test_each_channel_has_its_change_its_band_and_its_significant_lines() -> Non
     heights = np.asarray(band.get_paths()[0].vertices)[:, 1]
     assert heights.min() == -0.5
     assert heights.max() == 6.5
+
+
+def test_a_significant_line_alone_is_a_dot_and_neighbours_are_a_curve() -> None:
+    comparison = density_comparison()
+    significant = comparison.significant.copy()
+    significant[3, 20] = True
+    axes = comparison_figures([replace(comparison, significant=significant)])["change of psd 1 Acceleration"].axes[2]
+    (dots,) = [line for line in axes.lines if line.get_marker() == "."]
+    assert np.asarray(dots.get_xdata()).tolist() == [comparison.frequency_hz[20]]
 
 
 def test_colours_are_those_of_all_figures() -> None:

@@ -31,6 +31,7 @@ from chladni.viewers.figures.log_axis import Scales, power_of_ten
 from chladni.viewers.figures.peak_labels import LABELS, label_peaks
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.sheet import plain
+from chladni.viewers.figures.waveforms import POINTS
 from chladni.viewers.style import Style
 from tests.viewers import synthetic
 
@@ -153,6 +154,38 @@ def test_waterfall_image_is_the_density_in_decibels_where_it_belongs(figures: di
     assert image.get_extent() == pytest.approx((0.0, 40.0, -0.125, 128.125))
 
 
+def test_colours_of_a_waterfall_are_those_of_most_cells_not_of_the_drift_at_0_hz() -> None:
+    rng = np.random.default_rng(3)
+    # 30 dB of noise, and a trend that leaks 90 dB more into the first three lines.
+    values = 10 ** (rng.uniform(-3, 0, (1, 80, 513)))
+    values[..., :3] *= 1e9
+    channel = Channel(name="/a.x", unit="V")
+    fall = replace(
+        synthetic.waterfall(),
+        values=values,
+        time_s=np.arange(80.0),
+        frequency_hz=np.arange(513.0),
+        channels=(channel,),
+    )
+    (figure,) = waterfall_figures(Study(title="drift", waterfalls=(fall,))).values()
+    (image,) = figure.axes[0].images
+    # 5 % of uniform levels lie below -28.5 dB.
+    np.testing.assert_allclose(image.get_clim(), (-28.5, 0.0), atol=0.4)
+
+
+@pytest.mark.parametrize("log_frequency", [False, True])
+def test_a_waterfall_shows_the_band_that_is_asked_for(log_frequency: bool) -> None:
+    scales = Scales(band_hz=(10.0, 40.0), log_frequency=log_frequency)
+    figure = waterfall_figures(synthetic.study(), scales=scales)["waterfall 1 Acceleration"]
+    frequency_hz = synthetic.waterfall().frequency_hz
+    shown = frequency_hz[(frequency_hz >= 10) & (frequency_hz <= 40)]
+    step_hz = shown[1] - shown[0]
+    np.testing.assert_allclose(figure.axes[0].get_ylim(), (shown[0], shown[-1]), atol=0.5001 * step_hz)
+    assert figure.axes[0].get_yscale() == ("log" if log_frequency else "linear")
+    drawn = (figure.axes[0].collections if log_frequency else figure.axes[0].images)[0].get_array()
+    assert np.asarray(drawn).shape[0] == shown.size
+
+
 def test_a_waterfall_of_missing_samples_is_grey_not_an_error() -> None:
     waterfall = synthetic.waterfall()
     empty = replace(waterfall, values=np.full_like(waterfall.values, np.nan))
@@ -171,7 +204,7 @@ def test_waveform_keeps_the_extremes_and_the_gaps() -> None:
     (figure,) = waveform_figures(Study(title="long", series=(series,))).values()
     line = figure.axes[0].lines[0]
     x, y = (np.asarray(points, dtype=np.float64) for points in (line.get_xdata(), line.get_ydata()))
-    assert y.size <= 4000
+    assert y.size <= POINTS
     assert x[np.nanargmax(y)] == 31.415
     assert x[np.nanargmin(y)] == 27.182
     assert np.isnan(y[(x >= 60.0) & (x < 60.01)]).all()
@@ -235,7 +268,8 @@ def test_names_of_crowded_peaks_do_not_overlap() -> None:
     figure = density_figures(replace(synthetic.study(), peaks=crowd))[PSD]
     renderer = FigureCanvasAgg(figure).get_renderer()
     figure.draw(renderer)
-    boxes = [text.get_window_extent(renderer) for text in figure.axes[0].texts]
+    # Of the words alone, without the lines that lead to them.
+    boxes = [Text.get_window_extent(text, renderer) for text in figure.axes[0].texts]
     assert 1 < len(boxes) <= LABELS
     assert not any(one.overlaps(other) for place, one in enumerate(boxes) for other in boxes[:place])
     # Every peak keeps its mark.

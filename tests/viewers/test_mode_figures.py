@@ -207,7 +207,26 @@ def test_many_modes_are_divided_evenly() -> None:
         "mode shapes 16–20",
     ]
     assert len(found["mode shapes 1–5"].axes) == 6  # with the scale of colours
-    assert list(complexity_figures(study)) == ["complexity 1–7", "complexity 8–14", "complexity 15–20"]
+    assert list(complexity_figures(study)) == ["complexity 1–10", "complexity 11–20"]
+
+
+def test_many_poles_of_modes_are_joined_by_mode_not_ringed() -> None:
+    diagram = MODES.stabilisation
+    assert diagram is not None
+    rows = np.repeat(np.arange(diagram.order.size), 4)
+    many = replace(
+        diagram,
+        **{
+            name: getattr(diagram, name)[rows]
+            for name in ("order", "frequency_hz", "damping_ratio", "status", "mode")
+        },
+    )
+    figure = stabilisation_figures(replace(ALONE, modes=replace(MODES, stabilisation=many)))["stabilisation"]
+    lines = [line for line in figure.axes[0].lines if line.get_linestyle() == "-" and len(line.get_xdata()) > 2]
+    for mode, line in enumerate(lines):
+        assert set(line.get_xdata()) == set(diagram.frequency_hz[diagram.mode == mode])
+    assert len(lines) == diagram.mode.max() + 1
+    assert [str(line.get_label()) for line in figure.axes[0].lines].count("taken for a mode") == 1
 
 
 def test_stabilisation_shows_poles_by_status_over_the_indicator(figures: dict[str, Figure]) -> None:

@@ -54,7 +54,7 @@ class Album:
                 "densities": density_figures(study, scales=scales),
                 "responses": response_figures(study, scales=scales),
                 "nyquist": nyquist_figures(study),
-                "waterfalls": waterfall_figures(study),
+                "waterfalls": waterfall_figures(study, scales=scales),
                 "mode shapes": mode_shape_figures(study),
                 "relative motion": relative_motion_figures(study),
                 "stabilisation": stabilisation_figures(study),

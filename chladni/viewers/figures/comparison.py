@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chladni.signals.arrays import Real
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel
 from chladni.signals.comparison import DensityComparison, ResponseComparison
 from chladni.viewers.drawing import line_breaks, with_breaks
@@ -95,7 +95,7 @@ def _draw(
     frequency_hz: Real,
     change_db: Real,
     std_db: Real,
-    significant: np.ndarray,
+    significant: Mask,
     *,
     channel: Channel,
     style: Style,
@@ -106,18 +106,23 @@ def _draw(
     x, curves = with_breaks(frequency_hz, curves, line_breaks(frequency_hz))
     axes.axhline(0, color="black", linewidth=0.6, zorder=1)
     axes.fill_between(x, curves[:, 1], curves[:, 2], color=GREY, alpha=BAND_OPACITY, linewidth=0)
-    axes.plot(x, curves[:, 0], color=GREY, linewidth=0.6, label="after over before, ± 1 sigma")
-    axes.plot(
-        frequency_hz[significant],
-        change_db[significant],
-        linestyle="none",
-        marker=".",
-        markersize=2.5,
-        color=paint(style.on_light(channel)),
-        label="more than scatter explains",
-    )
+    axes.plot(x, curves[:, 0], color=GREY, linewidth=0.5, label="after over before, ± 1 sigma")
+    _draw_significant(axes, frequency_hz, change_db, significant, paint(style.on_light(channel)))
     axes.set_ylim(*_limits(change_db, sigma))
     axes.set_title(plain(style.labels[channel.name]), loc="left", pad=2)
+
+
+def _draw_significant(
+    axes: Axes, frequency_hz: Real, change_db: Real, significant: Mask, colour: tuple[float, float, float]
+) -> None:
+    """Colour the curve where it differs; thousands of dots on it would hide it."""
+    coloured = np.where(significant, change_db, np.nan)
+    x, y = with_breaks(frequency_hz, coloured, line_breaks(frequency_hz))
+    axes.plot(x, y, color=colour, linewidth=0.8, label="more than scatter explains", zorder=3)
+    # A line alone among others would have no length.
+    beside = np.convolve(significant, [1, 0, 1], mode="same") > 0
+    alone = significant & ~beside
+    axes.plot(frequency_hz[alone], change_db[alone], linestyle="none", marker=".", markersize=2.5, color=colour)
 
 
 def _limits(change_db: Real, sigma_db: Real) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from chladni.viewers.figures.sheet import look, paint, plain
 from chladni.viewers.mode_tables import mode_title
 from chladni.viewers.style import Style
 
-PLOTS_IN_A_FIGURE = 9
+PLOTS_IN_A_FIGURE = 12
 PANE_HEIGHT_IN = 1.72
 GREY = "#cccccc"
 # With more channels than colours the legend would tell nothing.
@@ -38,7 +38,7 @@ def complexity_figures(study: Study) -> dict[str, Figure]:
 
 
 def _figure(modes: ModeSet, validation: ModeValidation | None, rows: range, style: Style) -> Figure:
-    figure, stack = panes(len(rows), columns=3, height_in=PANE_HEIGHT_IN)
+    figure, stack = panes(len(rows), columns=4, height_in=PANE_HEIGHT_IN)
     for axes, row in zip(stack, rows, strict=True):
         _draw(axes, modes, row, style)
         title = mode_title(modes, row)

@@ -15,16 +15,17 @@ def gap_album(evidence: GapEvidence) -> Album:
     residuals = residual_figures(evidence)
     return Album(
         {
+            # What tells comes first; measured and simulated, which lie on each other where the answer is good, last.
             "residuals": residuals,
-            "friction": torque_map_figures(evidence, "velocity"),
-            "positions": torque_map_figures(evidence, "position"),
-            "motion": motion_figures(evidence),
-            "signals": signal_figures(evidence),
             # Residuals are the errors of a robot's torques.
             "errors": {} if residuals else error_figures(evidence),
-            "spectra": spectrum_figures(evidence),
-            "map": gap_map_figures(evidence),
             "force": restoring_force_figures(evidence),
+            "friction": torque_map_figures(evidence, "velocity"),
+            "positions": torque_map_figures(evidence, "position"),
+            "spectra": spectrum_figures(evidence),
+            "motion": motion_figures(evidence),
+            "map": gap_map_figures(evidence),
             "shares": share_figures(evidence),
+            "signals": signal_figures(evidence),
         }
     )

@@ -13,11 +13,11 @@ from matplotlib.gridspec import SubplotSpec
 from chladni.gap.records.diagnosis import Diagnosis, RestoringForce
 from chladni.io.atomic import atomic_write
 from chladni.viewers.figures.gap_shares import BAR_HEIGHT_IN, draw_shares, share_label, site_bars
-from chladni.viewers.figures.gap_signals import LEGEND, draw_zoom, windows_told
+from chladni.viewers.figures.gap_signals import LEGEND, draw_errors, windows_told
 from chladni.viewers.figures.gap_spectra import draw_spectrum
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.restoring_force import draw_surfaces
-from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
+from chladni.viewers.figures.sheet import SQUARE_IN, look, plain
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.gap_summary import caveats, summary
 from chladni.viewers.gap_tables import site_title, sites_named
@@ -38,7 +38,7 @@ def gap_sheet(evidence: GapEvidence, make: Callable[..., Figure] = Figure) -> Fi
         limits = [line for one in _limits(evidence.found) for line in _wrapped(one, LIMIT_LETTERS)]
         heights = [height for height, _ in parts]
         texts = 0.2 + LINE_IN * len(lines) + LIMIT_LINE_IN * len(limits)
-        figure = make(figsize=(WIDTH_IN * 1.25, sum(heights) + texts), layout="constrained")
+        figure = make(figsize=(SQUARE_IN * 1.25, sum(heights) + texts), layout="constrained")
         figure.suptitle("\n".join(map(plain, lines)), fontsize=SIZE, x=0.02, ha="left")
         if limits:
             figure.supxlabel("\n".join(map(plain, limits)), fontsize=LIMIT_SIZE, x=0.02, ha="left")
@@ -85,7 +85,7 @@ def _parts(evidence: GapEvidence) -> list[Part]:
     # Heights in inches; what isn't there takes none.
     parts: list[Part] = []
     if found.signals is not None:
-        parts += [(1.4, lambda figure, place: _zoom(figure, place, evidence))]
+        parts += [(1.4, lambda figure, place: _errors(figure, place, evidence))]
     if evidence.spectra is not None:
         parts += [(1.4, lambda figure, place: _spectrum(figure, place, evidence))]
     parts += [(2.6, partial(_force, surface=one)) for one in found.restoring_forces if one.force.size]
@@ -103,12 +103,13 @@ def _worst(found: Diagnosis) -> int:
     return max(range(len(names)), key=lambda row: gaps.get(names[row], 0.0))
 
 
-def _zoom(figure: Figure, place: SubplotSpec, evidence: GapEvidence) -> None:
+def _errors(figure: Figure, place: SubplotSpec, evidence: GapEvidence) -> None:
+    """Errors where the nominal model errs most: simulated with a good answer hides what was measured."""
     signals, telling_s = evidence.found.signals, evidence.telling_s
     if signals is None or telling_s is None:
         return
     axes, row = figure.add_subplot(place), _worst(evidence.found)
-    draw_zoom(axes, signals, row, telling_s, after=evidence.after)
+    draw_errors(axes, signals, row, after=evidence.after, span_s=telling_s)
     # On the other side of the legend.
     told = ", ".join(one for one in (signals.output_names[row], windows_told(evidence.found)) if one)
     axes.set_title(plain(told), loc="right", pad=2)

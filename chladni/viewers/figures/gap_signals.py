@@ -15,8 +15,8 @@ from chladni.viewers.figures.sheet import look, paint, plain, sheet
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, BEFORE_ON_LIGHT, MEASURED_ON_LIGHT, Evidence, GapEvidence
 from chladni.viewers.labels import printed_unit
 
-# Two a pixel at 300 dots an inch: what is left out can't be seen.
-POINTS = 3000
+# Several a pixel at 300 dots an inch: what is left out can't be seen, and a report's plot can be zoomed.
+POINTS = 8000
 OUTPUTS_A_FIGURE = 4
 # Of each output, with its name; of a few of them together at least as much as shows a curve. Above them the legend.
 HEIGHT_IN, LEAST_IN, LEGEND_POINTS = 1.15, 2.2, 16.0
@@ -53,7 +53,7 @@ def error_figures(evidence: Evidence) -> dict[str, Figure]:
                 evidence,
                 signals,
                 rows,
-                lambda axes, row: _draw_errors(axes, signals, row, after=evidence.after),
+                lambda axes, row: draw_errors(axes, signals, row, after=evidence.after),
                 x_label="Time [s]",
             )
             for part, rows in pages(len(signals.output_names), OUTPUTS_A_FIGURE)
@@ -111,18 +111,28 @@ def draw_zoom(axes: Axes, signals: GapSignals, row: int, span_s: tuple[float, fl
     axes.set_ylabel(f"[{plain(printed_unit(signals.output_units[row]))}]")
 
 
-def _draw_errors(axes: Axes, signals: GapSignals, row: int, *, after: str | None) -> None:
-    """Errors of the whole log; the noise as a band."""
-    starts = np.array(signals.window_starts[1:], dtype=np.intp)
-    time_s = signals.seconds
+def draw_errors(
+    axes: Axes,
+    signals: GapSignals,
+    row: int,
+    *,
+    after: str | None,
+    span_s: tuple[float, float] | None = None,
+) -> None:
+    """Draw the errors of one output, of the whole log or between two times; the noise as a band."""
+    # Half a sample early: a span begins and ends at samples, as far as numbers can be exact.
+    half_s = 0.5 / signals.sample_rate_hz
+    first, last = (int(np.searchsorted(signals.seconds, end - half_s)) for end in span_s or (-np.inf, np.inf))
+    starts = np.array([start - first for start in signals.window_starts if first < start < last], dtype=np.intp)
+    time_s, measured = signals.seconds[first:last], signals.measured[row, first:last]
     lines = [(signals.before, BEFORE, 0.9, "error" if after is None else "error before")]
     if after is not None:
         lines.append((signals.after, AFTER, 0.5, f"error {after}"))
     for simulated, colour, width, label in lines:
-        x, y = with_breaks(time_s, signals.measured[row] - simulated[row], starts)
+        x, y = with_breaks(time_s, measured - simulated[row, first:last], starts)
         chosen, _ = thin(y, limit=POINTS)
         axes.plot(x[chosen], y[chosen], color=colour, linewidth=width, label=label)
     noise = float(signals.noise_rms[row])
     axes.axhspan(-noise, noise, color="black", alpha=0.25, linewidth=0, zorder=4, label="noise")
-    axes.set_xlim(*signals.span_s)
+    axes.set_xlim(*(span_s or signals.span_s))
     axes.set_ylabel(f"[{plain(printed_unit(signals.output_units[row]))}]")

@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 from math import log10
 
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from chladni.signals.arrays import Real
+from chladni.signals.arrays import Mask, Real
 
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 # Over fewer decades than this, powers of ten alone are too few numbers.
@@ -25,10 +27,18 @@ class Scales:
         Whether levels are numbered in decibels over 1 of their unit.
     log_frequency
         Whether frequency has a logarithmic scale.
+    band_hz
+        Frequencies that are shown; None for all.
     """
 
     decibels: bool = False
     log_frequency: bool = False
+    band_hz: tuple[float, float] | None = None
+
+    def shown(self, frequency_hz: Real) -> Mask:
+        """Tell which frequencies are shown."""
+        low_hz, high_hz = self.band_hz or (-np.inf, np.inf)
+        return np.asarray((frequency_hz >= low_hz) & (frequency_hz <= high_hz))
 
     def unit(self, printed: str) -> str:
         """Give what a level is numbered in, where `printed` is the unit of its values."""
@@ -39,6 +49,8 @@ class Scales:
 
     def divide_frequency(self, axes: Axes, frequency_hz: Real) -> None:
         """Give the x axis its scale and limits; a logarithmic one begins at the first line above 0 Hz."""
+        shown = self.shown(frequency_hz)
+        frequency_hz = frequency_hz[shown] if shown.any() else frequency_hz
         if self.log_frequency and frequency_hz[-1] > 0:
             logarithmic_frequency(axes, frequency_hz[frequency_hz > 0][0], frequency_hz[-1])
         else:
@@ -77,10 +89,22 @@ def logarithmic_frequency(axes: Axes, low_hz: float, high_hz: float) -> None:
     """Give the x axis a logarithmic scale from `low_hz` to `high_hz`; numbers at 1, 2 and 5 where there is room."""
     axes.set_xscale("log")
     axes.set_xlim(low_hz, high_hz)
+    _number_frequencies(axes.xaxis, low_hz, high_hz)
+
+
+def logarithmic_lines(axes: Axes, frequency_hz: Real) -> None:
+    """Give the y axis a logarithmic scale of frequency, from the first line above 0 Hz to the last."""
+    low_hz, high_hz = float(frequency_hz[frequency_hz > 0][0]), float(frequency_hz[-1])
+    axes.set_yscale("log")
+    axes.set_ylim(low_hz, high_hz)
+    _number_frequencies(axes.yaxis, low_hz, high_hz)
+
+
+def _number_frequencies(axis: Axis, low_hz: float, high_hz: float) -> None:
     few = log10(high_hz / low_hz) < 2 * FEW_DECADES
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=12))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_locator(NullLocator())
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
 
 
 def logarithmic(axes: Axes, low: float, high: float, *, numbers: int = 7) -> None:

@@ -8,12 +8,12 @@ from chladni.viewers.gap_evidence import ComparisonEvidence
 
 
 def log_gap_album(evidence: ComparisonEvidence, *, prefix: str = "") -> Album:
-    """Draw signals, errors, spectra and the gap over band and time; names of figures begin with the prefix."""
+    """Draw errors, their spectra, the gap over band and time, and signals; names of figures begin with the prefix."""
     sections = {
-        "signals": signal_figures(evidence),
         "errors": error_figures(evidence),
         "spectra": spectrum_figures(evidence),
         "map": gap_map_figures(evidence),
+        "signals": signal_figures(evidence),
     }
     return Album(
         {

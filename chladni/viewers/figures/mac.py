@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.study import Study
-from chladni.viewers.figures.sheet import WIDTH_IN, look, plain
+from chladni.viewers.figures.sheet import SQUARE_IN, look, plain
 from chladni.viewers.mode_tables import has_mac, mode_ticks
 
 # Up to so many columns every cell has its number; up to a few more, those that aren't small.
@@ -58,9 +58,9 @@ def cross_mac_figure(
         )
     with look():
         share = min(1.0, 0.45 + 0.08 * len(columns))
-        width = WIDTH_IN * share
+        width = SQUARE_IN * share
         cell = (width - 1.4) / max(len(columns), 1)
-        figure = Figure(figsize=(width, min(cell * len(rows) + 0.9, 2 * WIDTH_IN)), layout="constrained")
+        figure = Figure(figsize=(width, min(cell * len(rows) + 0.9, 2 * SQUARE_IN)), layout="constrained")
         axes = figure.subplots()
         draw_mac(axes, mac, rows=rows, columns=columns)
         axes.set_xlabel(plain(column_name))

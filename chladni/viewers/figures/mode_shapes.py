@@ -46,7 +46,7 @@ def mode_shape_figures(study: Study) -> dict[str, Figure]:
 
 
 def _wires(modes: ModeSet, wireframe: Wireframe, rows: range) -> Figure:
-    figure, stack = panes(len(rows), columns=2, height_in=PANE_HEIGHT_IN)
+    figure, stack = panes(len(rows), columns=3, height_in=PANE_HEIGHT_IN)
     motion = wireframe.motion(modes.shapes[rows.start : rows.stop])
     moved = furthest(motion) * DRAWN_SHARE * wireframe.size
     scale = LinearSegmentedColormap.from_list("amplitude", AMPLITUDES / 255)
@@ -134,7 +134,7 @@ def _projected(wireframe: Wireframe, places: Real) -> Real:
 def _bars(modes: ModeSet, rows: range, style: Style) -> Figure:
     count = len(modes.channels)
     height_in = min(max(1.3, 0.5 + BAR_HEIGHT_IN * count), 4.5)
-    figure, stack = panes(len(rows), columns=2, height_in=height_in, sharey=True, sharex=True)
+    figure, stack = panes(len(rows), columns=3, height_in=height_in, sharey=True, sharex=True)
     places = np.arange(count)
     colours = [paint(style.on_light(channel)) for channel in modes.channels]
     for axes, row in zip(stack, rows, strict=True):

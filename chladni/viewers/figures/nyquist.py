@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from chladni.signals.study import Study
 from chladni.viewers.drawing import line_breaks, with_breaks
-from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
+from chladni.viewers.figures.sheet import SQUARE_IN, legend, look, paint, plain, sheet
 from chladni.viewers.panels import Panel, panels
 from chladni.viewers.style import Style
 
@@ -26,7 +26,7 @@ def nyquist_figures(study: Study) -> dict[str, Figure]:
 
 
 def _figure(panel: Panel, style: Style) -> Figure:
-    figure, (axes,) = sheet([4.2])
+    figure, (axes,) = sheet([4.2], width_in=SQUARE_IN)
     breaks = line_breaks(panel.frequency_hz())
     for row in panel.group.rows:
         channel, value = panel.response.responses[row], panel.function(row)

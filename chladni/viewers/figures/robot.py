@@ -23,7 +23,7 @@ from chladni.viewers.style import AMPLITUDES, amplitude_colours
 from chladni.viewers.torque_maps import load_reach, map_title, maps_over, torque_range, turns_of
 
 #: Of a pane that is a third of the sheet wide.
-COLUMNS, HEIGHT_IN, MOST = 3, 1.25, 12
+COLUMNS, HEIGHT_IN, MOST = 3, 1.45, 12
 POINTS = 1500
 _LOAD = LinearSegmentedColormap.from_list("load", AMPLITUDES / 255)
 

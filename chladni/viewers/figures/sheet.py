@@ -16,9 +16,11 @@ from matplotlib.transforms import ScaledTranslation
 from chladni.signals.visible import visible
 from chladni.viewers.style import Colour
 
-# A figure this wide is set across one column of a page at three quarters of its size, type then 6.4 pt.
-WIDTH_IN = 4.6
-LEGEND_COLUMNS = 3
+# Both columns of a journal's page; a report shows it as wide as its text.
+WIDTH_IN = 7.2
+# Of what is as high as it's wide: one column.
+SQUARE_IN = 4.6
+LEGEND_COLUMNS = 6
 # Numbers and the name of an axis, and the line with its blanks beside a legend's word.
 BESIDE_AXES_POINTS = 50.0
 BESIDE_WORD_POINTS = 27.0
@@ -62,16 +64,21 @@ def look() -> Iterator[None]:
         yield
 
 
-def sheet(heights_in: Sequence[float], *, above_points: float = 0.0, **options: Any) -> tuple[Figure, list[Axes]]:
+def sheet(
+    heights_in: Sequence[float], *, above_points: float = 0.0, width_in: float = WIDTH_IN, **options: Any
+) -> tuple[Figure, list[Axes]]:
     """Make a figure of stacked axes, one for each height, with some points more for what stands above the first."""
     # Not through pyplot: that would choose a window system and keep every figure alive.
-    figure = Figure(figsize=(WIDTH_IN, sum(heights_in) + above_points / 72), layout="constrained")
+    figure = Figure(figsize=(width_in, sum(heights_in) + above_points / 72), layout="constrained")
     axes = figure.subplots(len(heights_in), 1, squeeze=False, height_ratios=list(heights_in), **options)
     return figure, list(axes[:, 0])
 
 
-def legend(axes: Axes, *, above_points: float = 0.0) -> None:
-    """Put the legend above the axes, where it can't cover data, and above what stands there already."""
+def legend(axes: Axes, *, above_points: float = 0.0, mark_scale: float = 1.0) -> None:
+    """Put the legend above the axes, where it can't cover data, and above what stands there already.
+
+    `mark_scale` enlarges marks that are small for their number.
+    """
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         # A legend wider than the axes would leave none of them.
@@ -88,6 +95,7 @@ def legend(axes: Axes, *, above_points: float = 0.0) -> None:
             borderaxespad=0.2,
             handlelength=1.4,
             columnspacing=1.2,
+            markerscale=mark_scale,
         )
 
 

@@ -22,6 +22,11 @@ HEIGHT_IN = 3.4
 INDICATOR = "#8a8a8a"
 MACHINE = "#c03030"
 MARKS = (".", "^", "s", "o")
+TAKEN = "taken for a mode"
+# Of the distance between two model orders.
+MARK_SHARE, MARK_POINTS = 0.55, (0.9, 2.2)
+# More of them hide the poles that they ring.
+RINGS = 250
 
 
 def stabilisation_figures(study: Study) -> dict[str, Figure]:
@@ -55,11 +60,12 @@ def draw_stabilisation(
     names = [(hertz, colour) for hertz, colour in names if low_hz <= hertz <= high_hz]
     for hertz, colour in names:
         poles.axvline(hertz, color=colour, linewidth=0.4, alpha=0.5, zorder=2)
-    legend(poles, above_points=name_above(poles, names))
+    legend(poles, above_points=name_above(poles, names), mark_scale=MARK_POINTS[1] / _mark_points(diagram))
 
 
 def _draw_poles(poles: Axes, diagram: StabilisationDiagram) -> None:
-    """Poles by status, each kind with a mark and a colour of its own, and a ring round those that became modes."""
+    """Poles by status, each kind with a mark and a colour of its own, and those marked that became modes."""
+    size = _mark_points(diagram)
     for status, (name, mark) in enumerate(zip(STATUS_NAMES, MARKS, strict=True)):
         chosen = diagram.status == status
         poles.plot(
@@ -67,13 +73,17 @@ def _draw_poles(poles: Axes, diagram: StabilisationDiagram) -> None:
             diagram.order[chosen],
             linestyle="none",
             marker=mark,
-            markersize=2.2 if status else 3.0,
+            # A dot is drawn at half its size.
+            markersize=size if status else 1.4 * size,
             color=paint(STATUS_ON_LIGHT[status]),
             markeredgewidth=0.0,
             label=name,
             zorder=3 + status,
         )
     taken = diagram.mode >= 0
+    if int(taken.sum()) > RINGS:
+        _join(poles, diagram)
+        return
     poles.plot(
         diagram.frequency_hz[taken],
         diagram.order[taken],
@@ -83,9 +93,31 @@ def _draw_poles(poles: Axes, diagram: StabilisationDiagram) -> None:
         markerfacecolor="none",
         markeredgecolor="black",
         markeredgewidth=0.4,
-        label="taken for a mode",
+        label=TAKEN,
         zorder=8,
     )
+
+
+def _mark_points(diagram: StabilisationDiagram) -> float:
+    """So large that marks of neighbouring orders don't run into one bar."""
+    orders = np.ptp(diagram.order) + 1 if diagram.order.size else 1
+    return float(np.clip(MARK_SHARE * HEIGHT_IN * 72 / orders, *MARK_POINTS))
+
+
+def _join(poles: Axes, diagram: StabilisationDiagram) -> None:
+    """Join the poles of each mode by a line: so many rings would hide them."""
+    for mode in np.unique(diagram.mode[diagram.mode >= 0]):
+        rows = np.flatnonzero(diagram.mode == mode)
+        rows = rows[np.argsort(diagram.order[rows])]
+        poles.plot(
+            diagram.frequency_hz[rows],
+            diagram.order[rows],
+            color="black",
+            linewidth=0.6,
+            alpha=0.7,
+            label=TAKEN if mode == diagram.mode.max() else None,
+            zorder=2.5,
+        )
 
 
 def _draw_indicator(poles: Axes, shown_hz: tuple[float, float], diagram: StabilisationDiagram) -> None:

@@ -6,11 +6,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.transforms import ScaledTranslation
 
-from chladni.viewers.figures.peak_labels import GAP_POINTS, LETTERS_POINTS, ROOM, STRIP_POINTS
+from chladni.viewers.figures.peak_labels import LETTERS_POINTS
 from chladni.viewers.mode_tables import hertz
 from chladni.viewers.spread import spread
 
-__all__ = ["STRIP_POINTS", "name_above"]
+# Share of the axis that an upright name takes.
+ROOM = 0.022
+GAP_POINTS = 3.0
+# "0.1234 Hz", the longest name.
+STRIP_POINTS = 35.0
 
 
 def name_above(axes: Axes, names: Sequence[tuple[float, str]]) -> float:

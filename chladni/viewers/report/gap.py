@@ -58,18 +58,21 @@ def gap_report_html(evidence: GapEvidence, *, album: Album | None = None) -> str
 def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
     yield element("h1", escaped(title))
     yield _logs(found)
-    # Of a robot one picture shows the difference at once.
-    yield _section("Torque that is missing", _flow(_pictures(found, album, "residuals")))
+    # One picture shows the difference at once.
+    yield _section("Torque that is missing", _pictures(found, album, "residuals"))
+    yield _section("Errors, before and after", _pictures(found, album, "errors"))
     yield _section("Answer", _answer(found))
+    yield _section("Force that is missing", _pictures(found, album, "force"))
     yield _section("Causes", _causes(found))
-    yield _section("Friction", _flow(_pictures(found, album, "friction", "positions")))
-    yield _section("Evidence", _flow(_pictures(found, album, "motion", "signals", "errors", "spectra", "force")))
+    yield _section("Friction", _pictures(found, album, "friction", "positions"))
+    yield _section("Spectra of the errors", _pictures(found, album, "spectra"))
+    yield _section("Motion", _pictures(found, album, "motion"))
     # With one sensor no site can be told from another, and bands and regimes are read as easily in tables.
     drawn = bool(found.where.sites and album.sections.get("shares"))
     places = ("shares", "map") if drawn else ("map",)
     yield _section(
         "Where it lies",
-        _flow(_where(found, drawn=drawn), _pictures(found, album, *places)) + _left(found) + _noise(found),
+        _where(found, drawn=drawn) + _pictures(found, album, *places) + _left(found) + _noise(found),
     )
     yield _section(
         "What was weighed", _tables((tables.ranking_table(found, count=RANKED), (2, 3, 4))) + _naive(found)
@@ -79,6 +82,7 @@ def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
         _tables((tables.parameter_table(found), (1, 2, 3))),
     )
     yield _section(tables.distortion_title(found.distortion), _tables((tables.distortion_table(found), (1, 2, 3, 4))))
+    yield _section("Measured and simulated", _pictures(found, album, "signals"))
     yield _section("Limits", _list((*found.levels, *found.remarks, *_held_out(found))))
 
 
@@ -119,12 +123,6 @@ def _left(found: Diagnosis) -> str:
 def _noise(found: Diagnosis) -> str:
     told = tables.noise_told(found.where)
     return "" if told is None else element("p", escaped(told), class_="note")
-
-
-def _flow(*shown: str) -> str:
-    """Side by side where there is room for it."""
-    content = "".join(shown)
-    return element("div", content, class_="flow") if content else ""
 
 
 def _section(heading: str, content: str) -> str:
