@@ -50,8 +50,8 @@ def test_there_is_one_simulation_in_every_figure(evidence: ComparisonEvidence) -
 def test_the_report_holds_what_the_terminal_says(evidence: ComparisonEvidence) -> None:
     odd = replace(evidence, simulated="<b>theirs</b>")
     album = log_gap_album(evidence)
-    page = log_gap_report_html([(odd, album)], levels=("the gap grows",))
+    page = log_gap_report_html([(odd, album)], levels=("the gap grows",), interactive=False)
     for words in (*evidence.answer, "Limits", "the gap grows", "&lt;b&gt;theirs", evidence.where.channels[0].name):
         assert words.replace("'", "&#x27;") in page
     assert "<b>" not in page
-    assert page.count("<figure>") == len(album.figures)
+    assert page.count("<figure") == len(album.figures)

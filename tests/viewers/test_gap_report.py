@@ -20,7 +20,7 @@ NO_FIGURES = Album({})
 
 @pytest.fixture(scope="module")
 def arm() -> str:
-    return gap_report_html(gap_evidence(made.periodic()))
+    return gap_report_html(gap_evidence(made.periodic()), interactive=False)
 
 
 def test_the_report_begins_with_the_answer(arm: str) -> None:

@@ -19,7 +19,7 @@ ARM = made.arm_study()
 
 @pytest.fixture(scope="module")
 def arm() -> str:
-    return report_html(replace(ARM, response=None))
+    return report_html(replace(ARM, response=None), interactive=False)
 
 
 def test_report_holds_the_table_of_modes_with_error_bars(arm: str) -> None:
@@ -91,7 +91,9 @@ def test_names_and_notes_are_text() -> None:
     modes = made.modes_of(made.one_mode())
     channels = (replace(modes.channels[0], name="/<script>alert(1)</script>.x"), *modes.channels[1:])
     noted = modes.provenance.with_notes("<b>bold</b>")
-    page = Page(report_html(Study(title="x", modes=replace(modes, channels=channels, provenance=noted))))
+    page = Page(
+        report_html(Study(title="x", modes=replace(modes, channels=channels, provenance=noted)), interactive=False)
+    )
     assert page.open == []
     assert not {"script", "b"} & set(page.tags)
     assert "<b>bold</b>" in page.texts

@@ -21,6 +21,7 @@ from chladni.signals.visible import visible
 from chladni.viewers.figures import Album
 from chladni.viewers.report import report_html, write_report
 from chladni.viewers.report.markup import element, escaped, table
+from chladni.viewers.screen_colours import with_dark_scheme
 from tests.viewers import synthetic
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -58,13 +59,13 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def arm() -> str:
-    return report_html(synthetic.study())
+    return report_html(synthetic.study(), interactive=False)
 
 
 @pytest.fixture(scope="module")
 def hostile() -> str:
     # Spectra alone show every name; the other figures have the same way with names.
-    return report_html(replace(synthetic.hostile_study(), waterfalls=(), response=None))
+    return report_html(replace(synthetic.hostile_study(), waterfalls=(), response=None), interactive=False)
 
 
 def test_report_holds_findings_peaks_channels_and_method(arm: str) -> None:
@@ -142,9 +143,9 @@ def test_figures_that_are_drawn_already_are_used() -> None:
     nothing = Album.of(Study(title="nothing"))
     assert "img" not in Page(report_html(synthetic.study(), album=nothing)).tags
     album = Album.of(Study(title="psd", densities=(synthetic.density(),)))
-    page = report_html(Study(title="psd"), album=album)
+    page = report_html(Study(title="psd"), album=album, interactive=False)
     for name in album.figures:
-        assert base64.b64encode(album.rendered(name, "svg")).decode() in page
+        assert base64.b64encode(with_dark_scheme(album.rendered(name, "svg").decode()).encode()).decode() in page
 
 
 def test_writing_is_whole_or_not_at_all(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from math import log10
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import Formatter, FuncFormatter, LogLocator, NullLocator
 
 from chladni.signals.arrays import Mask, Real
 
@@ -15,6 +15,17 @@ _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 FEW_DECADES = 2.0
 # Over fewer decibels, steps of ten are too few numbers.
 FEW_DECIBELS = 40.0
+
+
+class DecibelFormatter(Formatter):
+    """Numbers of a logarithmic axis in decibels over 1 of its unit; `decade_db`: 10 for powers, 20 for amplitudes."""
+
+    def __init__(self, decade_db: float) -> None:
+        self.decade_db = decade_db
+
+    def __call__(self, x: float, pos: int | None = None) -> str:  # noqa: ARG002  # matplotlib's own
+        """Print one number."""
+        return f"{self.decade_db * log10(x):.0f}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +74,7 @@ class Scales:
             return
         step_db = 10.0 if high_db - low_db >= FEW_DECIBELS else 5.0
         axes.yaxis.set_major_locator(LogLocator(base=10 ** (step_db / decade_db), numticks=12))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{decade_db * log10(value):.0f}"))
+        axes.yaxis.set_major_formatter(DecibelFormatter(decade_db))
         axes.yaxis.set_minor_locator(NullLocator())
 
 

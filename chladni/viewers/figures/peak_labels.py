@@ -1,6 +1,6 @@
 """Names of peaks in a figure: a mark on each, and its frequency in a row above the frame, crossed by no line."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 import scipy.optimize

@@ -6,8 +6,8 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
 
 from chladni.signals.arrays import Real
 from chladni.signals.study import Study

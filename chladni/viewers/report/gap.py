@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from chladni.gap.records.diagnosis import Diagnosis
@@ -13,14 +14,20 @@ from chladni.viewers.figures.gap import gap_album
 from chladni.viewers.figures.gap_signals import windows_told
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.gap_summary import naive_sentence, summary, used_length
-from chladni.viewers.report.markup import PAGE, element, escaped, table
-from chladni.viewers.report.pictures import picture
+from chladni.viewers.report.markup import element, escaped, page, table
+from chladni.viewers.report.pictures import Pictures
 
 # More than in a terminal: the page can be scrolled.
 RANKED = 12
 
 
-def write_gap_report(evidence: GapEvidence, path: str | os.PathLike[str], *, album: Album | None = None) -> Path:
+def write_gap_report(
+    evidence: GapEvidence,
+    path: str | os.PathLike[str],
+    *,
+    album: Album | None = None,
+    interactive: bool | None = None,
+) -> Path:
     """Write the report of a diagnosis as one HTML file, whole or not at all.
 
     Parameters
@@ -31,6 +38,8 @@ def write_gap_report(evidence: GapEvidence, path: str | os.PathLike[str], *, alb
         File to write; one that exists is replaced.
     album
         The figures, when they are drawn already.
+    interactive
+        Whether plots zoom and read out, which takes Bokeh; None for where it's installed. Else they are pictures.
 
     Returns
     -------
@@ -44,35 +53,50 @@ def write_gap_report(evidence: GapEvidence, path: str | os.PathLike[str], *, alb
     """
     target = Path(path)
     with atomic_write(target) as file:
-        file.write(gap_report_html(evidence, album=album).encode())
+        file.write(gap_report_html(evidence, album=album, interactive=interactive).encode())
     return target
 
 
-def gap_report_html(evidence: GapEvidence, *, album: Album | None = None) -> str:
-    """Give the report as HTML: the answer, its evidence in tables and figures, no script and nothing to fetch."""
+def gap_report_html(evidence: GapEvidence, *, album: Album | None = None, interactive: bool | None = None) -> str:
+    """Give the report as HTML: the answer, its evidence in figures and tables, and nothing to fetch."""
     title = f"{evidence.found.model}: the gap to {', '.join(evidence.found.logs)}"
-    body = "\n".join(_body(title, evidence.found, album or gap_album(evidence)))
-    return PAGE.substitute(title=escaped(title), body=body)
+    album = album or gap_album(evidence)
+    pictures = Pictures(album, interactive=interactive)
+    body = "\n".join(_body(title, evidence.found, _Shown(pictures, album, _captions(evidence.found))))
+    return page(title, body, pictures.scripts())
 
 
-def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """The figures of a page, and what is said of those of each section."""
+
+    pictures: Pictures
+    album: Album
+    captions: Mapping[str, str]
+
+    def of(self, *sections: str) -> str:
+        """Give the figures of some sections as HTML."""
+        return "".join(self.pictures.figures(self.album, one, self.captions[one]) for one in sections)
+
+
+def _body(title: str, found: Diagnosis, shown: _Shown) -> Iterator[str]:
     yield element("h1", escaped(title))
     yield _logs(found)
     # One picture shows the difference at once.
-    yield _section("Torque that is missing", _pictures(found, album, "residuals"))
-    yield _section("Errors, before and after", _pictures(found, album, "errors"))
+    yield _section("Torque that is missing", shown.of("residuals"))
     yield _section("Answer", _answer(found))
-    yield _section("Force that is missing", _pictures(found, album, "force"))
+    yield _section("Errors, before and after", shown.of("errors"))
+    yield _section("Force that is missing", shown.of("force"))
     yield _section("Causes", _causes(found))
-    yield _section("Friction", _pictures(found, album, "friction", "positions"))
-    yield _section("Spectra of the errors", _pictures(found, album, "spectra"))
-    yield _section("Motion", _pictures(found, album, "motion"))
+    yield _section("Friction", shown.of("friction", "positions"))
+    yield _section("Spectra of the errors", shown.of("spectra"))
+    yield _section("Motion", shown.of("motion"))
     # With one sensor no site can be told from another, and bands and regimes are read as easily in tables.
-    drawn = bool(found.where.sites and album.sections.get("shares"))
+    drawn = bool(found.where.sites and shown.album.sections.get("shares"))
     places = ("shares", "map") if drawn else ("map",)
     yield _section(
         "Where it lies",
-        _where(found, drawn=drawn) + _pictures(found, album, *places) + _left(found) + _noise(found),
+        _where(found, drawn=drawn) + shown.of(*places) + _left(found) + _noise(found),
     )
     yield _section(
         "What was weighed", _tables((tables.ranking_table(found, count=RANKED), (2, 3, 4))) + _naive(found)
@@ -82,7 +106,7 @@ def _body(title: str, found: Diagnosis, album: Album) -> Iterator[str]:
         _tables((tables.parameter_table(found), (1, 2, 3))),
     )
     yield _section(tables.distortion_title(found.distortion), _tables((tables.distortion_table(found), (1, 2, 3, 4))))
-    yield _section("Measured and simulated", _pictures(found, album, "signals"))
+    yield _section("Measured and simulated", shown.of("signals"))
     yield _section("Limits", _list((*found.levels, *found.remarks, *_held_out(found))))
 
 
@@ -193,13 +217,6 @@ def _captions(found: Diagnosis) -> Mapping[str, str]:
         "shares": ("In colour: the site that was named." if coloured else "")
         or ("Of what the best parameters leave." if found.left is not None else "Shares of the gap."),
     }
-
-
-def _pictures(found: Diagnosis, album: Album, *sections: str) -> str:
-    captions = _captions(found)
-    return "".join(
-        picture(album, name, captions[section]) for section in sections for name in album.sections.get(section, {})
-    )
 
 
 def _list(sentences: Sequence[str]) -> str:

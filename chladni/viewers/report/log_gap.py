@@ -7,8 +7,8 @@ from chladni.io.atomic import atomic_write
 from chladni.viewers import gap_tables as tables
 from chladni.viewers.figures.album import Album
 from chladni.viewers.gap_evidence import ComparisonEvidence
-from chladni.viewers.report.markup import PAGE, element, escaped, table
-from chladni.viewers.report.pictures import picture
+from chladni.viewers.report.markup import element, escaped, page, table
+from chladni.viewers.report.pictures import Pictures
 
 Pages = Sequence[tuple[ComparisonEvidence, Album]]
 
@@ -20,7 +20,9 @@ _CAPTIONS = {
 }
 
 
-def write_log_gap_report(pages: Pages, path: Path, *, levels: Sequence[str] = ()) -> Path:
+def write_log_gap_report(
+    pages: Pages, path: Path, *, levels: Sequence[str] = (), interactive: bool | None = None
+) -> Path:
     """Write the report of one comparison or several as one HTML file, whole or not at all.
 
     Parameters
@@ -31,6 +33,8 @@ def write_log_gap_report(pages: Pages, path: Path, *, levels: Sequence[str] = ()
         File to write; one that exists is replaced.
     levels
         Sentences on what changes from one to the next.
+    interactive
+        Whether plots zoom and read out, which takes Bokeh; None for where it's installed. Else they are pictures.
 
     Raises
     ------
@@ -38,24 +42,25 @@ def write_log_gap_report(pages: Pages, path: Path, *, levels: Sequence[str] = ()
         When the file can't be written.
     """
     with atomic_write(path) as file:
-        file.write(log_gap_report_html(pages, levels=levels).encode())
+        file.write(log_gap_report_html(pages, levels=levels, interactive=interactive).encode())
     return path
 
 
-def log_gap_report_html(pages: Pages, *, levels: Sequence[str] = ()) -> str:
-    """Give the report as HTML: what is said, tables and figures, no script and nothing to fetch."""
+def log_gap_report_html(pages: Pages, *, levels: Sequence[str] = (), interactive: bool | None = None) -> str:
+    """Give the report as HTML: what is said, figures and tables, and nothing to fetch."""
+    pictures = Pictures(*(album for _, album in pages), interactive=interactive)
     title = "; ".join(f"{one.simulated}: the gap to {one.signals.log}" for one, _ in pages)
     body = [element("h1", escaped(title)), _section("What changes with level", _list(levels))]
     for evidence, album in pages:
-        body += _comparison(evidence, album, heading=f"{evidence.signals.log}: " if len(pages) > 1 else "")
-    return PAGE.substitute(title=escaped(title), body="\n".join(body))
+        body += _comparison(evidence, album, pictures, heading=f"{evidence.signals.log}: " if len(pages) > 1 else "")
+    return page(title, "\n".join(body), pictures.scripts())
 
 
-def _comparison(evidence: ComparisonEvidence, album: Album, *, heading: str) -> Iterator[str]:
+def _comparison(evidence: ComparisonEvidence, album: Album, pictures: Pictures, *, heading: str) -> Iterator[str]:
     where = evidence.where
     yield _section(f"{heading}Answer", "".join(element("p", escaped(one)) for one in evidence.answer))
-    shown = "".join(picture(album, name, _CAPTIONS[part]) for part, names in album.sections.items() for name in names)
-    yield _section(f"{heading}Evidence", element("div", shown, class_="flow") if shown else "")
+    shown = "".join(pictures.figures(album, part, _CAPTIONS[part]) for part in album.sections)
+    yield _section(f"{heading}Evidence", shown)
     told = (
         tables.channel_table(where),
         tables.band_table(where),

@@ -1,20 +1,22 @@
 """The report's page and file."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from chladni.io.atomic import atomic_write
 from chladni.signals.study import Study
 from chladni.viewers.figures import Album
-from chladni.viewers.report.markup import PAGE, element, escaped
+from chladni.viewers.report.markup import element, escaped, page
 from chladni.viewers.report.modes import modes_section, relative_motion_section
-from chladni.viewers.report.pictures import pictures
+from chladni.viewers.report.pictures import Pictures, sections
 from chladni.viewers.report.tables import channel_table, method_table, peak_table
 from chladni.viewers.style import Style
 
 
-def write_report(study: Study, path: str | os.PathLike[str], *, album: Album | None = None) -> Path:
+def write_report(
+    study: Study, path: str | os.PathLike[str], *, album: Album | None = None, interactive: bool | None = None
+) -> Path:
     """Write the report of a study as one HTML file, whole or not at all.
 
     Parameters
@@ -25,6 +27,8 @@ def write_report(study: Study, path: str | os.PathLike[str], *, album: Album | N
         File to write; one that exists is replaced.
     album
         The study's figures when they are drawn already.
+    interactive
+        Whether plots zoom and read out, which takes Bokeh; None for where it's installed. Else they are pictures.
 
     Returns
     -------
@@ -38,30 +42,36 @@ def write_report(study: Study, path: str | os.PathLike[str], *, album: Album | N
     """
     target = Path(path)
     with atomic_write(target) as file:
-        file.write(report_html(study, album=album).encode())
+        file.write(report_html(study, album=album, interactive=interactive).encode())
     return target
 
 
-def report_html(study: Study, *, album: Album | None = None) -> str:
-    """Give the report of a study as HTML: findings, tables and figures, no script and nothing to fetch.
+def report_html(study: Study, *, album: Album | None = None, interactive: bool | None = None) -> str:
+    """Give the report of a study as HTML: findings, figures and tables, and nothing to fetch.
 
-    Everything that came from the log is escaped, and the page's own policy forbids scripts and requests.
+    Everything that came from the log is escaped. The page's own policy forbids requests, and every script but the
+    library of the plots and what starts it; without plots, all.
     """
-    return PAGE.substitute(title=escaped(study.title), body="\n".join(_body(study, album or Album.of(study))))
+    album = album or Album.of(study)
+    pictures = Pictures(album, interactive=interactive)
+    body = "\n".join(_body(study, sections(pictures, album)))
+    return page(study.title, body, pictures.scripts())
 
 
-def _body(study: Study, album: Album) -> Iterator[str]:
+def _body(study: Study, shown: Mapping[str, str]) -> Iterator[str]:
     style = Style.of(study)
     yield element("h1", escaped(study.title))
     if study.findings:
         yield _section("Findings", element("ul", "".join(element("li", escaped(text)) for text in study.findings)))
     yield from _modes(study, style)
-    yield _section(
-        "Peaks of the frequency responses", peak_table(study.response_peaks, style, channels="Response, reference")
-    )
-    yield _section("Peaks of the spectra", peak_table(study.peaks, style, channels="Channels, strongest first"))
-    for heading, shown in pictures(album).items():
-        yield _section(heading, shown)
+    # Numbers stand under the curves that they are read from.
+    tables = {
+        "Frequency responses": (study.response_peaks, "Response, reference"),
+        "Power spectral densities": (study.peaks, "Channels, strongest first"),
+    }
+    for heading, figures in shown.items():
+        peaks, channels = tables.get(heading, ((), ""))
+        yield _section(heading, figures + peak_table(peaks, style, channels=channels))
     yield _section("Channels", channel_table(study, style))
     yield _section("Method", method_table(study))
 
