@@ -61,7 +61,7 @@ def diagnose_gap(
     own_effects
         Effects of your own that take part, see docs/effects.md.
     seed
-        Of everything random; the same input and seed give the same answer. Of a robot nothing is.
+        Start of the random numbers; the same input and seed give the same answer. A robot's diagnosis draws none.
     start_s, end_s
         Only samples with ``start_s <= t < end_s``, seconds from each log's start.
     join

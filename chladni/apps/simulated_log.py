@@ -55,7 +55,7 @@ class Drive:
     band_hz
         Of noise, multisine and sweep.
     seed
-        Of everything random, the sensors' noise included.
+        Start of the random numbers, those of the sensors' noise included.
     noise
         Standard deviation of each output's sensor noise over the output's own RMS.
     """

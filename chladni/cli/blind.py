@@ -42,7 +42,9 @@ def make(
     directory: Folder,
     *,
     count: Annotated[int, typer.Option(metavar="N", min=1, help="Number of cases.")] = 200,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random in them.")] = 0,
+    seed: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Start of the random numbers; the same seed gives the same cases.")
+    ] = 0,
     generator: Annotated[
         str, typer.Option(metavar="NAME", help="What draws the machines: chains, networks, robots.")
     ] = "chains",
@@ -74,7 +76,12 @@ def make(
 def run(
     directory: Folder,
     *,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random in the diagnosis.")] = 0,
+    seed: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=0, help="Start of the diagnosis's random numbers; the same seed gives the same answer."
+        ),
+    ] = 0,
     jobs: Jobs = None,
     json: options.Json = None,
 ) -> None:

@@ -47,7 +47,9 @@ Without = Annotated[
     list[str] | None,
     typer.Option(metavar="EFFECT", help="Leave this effect out; may be repeated.", show_default=False),
 ]
-Seed = Annotated[int, typer.Option(metavar="N", min=0, help="Of everything random.")]
+Seed = Annotated[
+    int, typer.Option(metavar="N", min=0, help="Start of the random numbers; the same seed gives the same answer.")
+]
 Report = Annotated[
     Path | None,
     typer.Option(

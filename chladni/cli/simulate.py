@@ -56,7 +56,9 @@ Driving = Annotated[
     ),
 ]
 Noise = Annotated[float, typer.Option(metavar="SHARE", help="Noise of each sensor, as a share of its signal's RMS.")]
-Seed = Annotated[int, typer.Option(metavar="N", help="Of everything random.")]
+Seed = Annotated[
+    int, typer.Option(metavar="N", help="Start of the random numbers; the same seed gives the same log.")
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Change a parameter; may be repeated.", show_default=False),

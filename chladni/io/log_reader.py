@@ -308,7 +308,7 @@ class LogReader:
                 often = [f"{counted(one.time_base.clock.count, 'time')}" for one in (first, placement)]
                 raise LogError(
                     f"{self.container.path.name}: the clock of {first.stream.label} was set {often[0]} and that of "
-                    f"{placement.stream.label} {often[1]}, so it isn't known which samples belong together: take one "
+                    f"{placement.stream.label} {often[1]}, so it isn't known which samples belong together. Take one "
                     "after the other, a part before the first time (--end S), or all by the log's times (--stamp log)"
                 )
 

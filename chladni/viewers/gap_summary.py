@@ -275,7 +275,7 @@ def _closed(gap: Closing) -> Iterator[str]:
     yield from _too_near(gap)
     if gap.closed is not None and gap.interval is not None:
         low, high = (percent(end).removesuffix(" %") for end in gap.interval)
-        yield f"Closed: {percent(gap.closed)} of what noise leaves to close, 95 % interval {low} to {high} %."
+        yield f"Adding it closes {percent(gap.closed)} of the gap above the noise (95 % interval {low} to {high} %)."
 
 
 def _too_near(gap: Closing) -> Iterator[str]:

@@ -33,7 +33,7 @@ class Reach:
     begins_with_log
         Whether it begins where the log does, with the initial states that fits found.
     seed
-        Of everything random.
+        Start of the random numbers: the same seed gives the same answer.
     """
 
     model: Model

@@ -62,7 +62,7 @@ def diagnose(
     Parameters
     ----------
     measurements
-        One at least.
+        Logs of the real machine, one or more.
     leave_out
         Words of effects that don't take part.
     own_effects

@@ -77,13 +77,13 @@ def neighbour_note(channels: Sequence[Channel], geometry: Geometry) -> str | Non
         return f"No line joins the points; they were taken for neighbours in the order of the channels: {order}."
     if any(_label(channel) for channel in channels):
         return (
-            "The channels have no points: relative motion is between channels of one direction in the order listed, "
-            "by the last letter of their names, which needn't be neighbours; give a setup file with points, "
-            "directions and lines, and the joint to treat is named."
+            "The channels have no points. Relative motion is between channels in the order listed whose names end in "
+            "the same letter, and these needn't be neighbours. Give a setup file with points, directions and lines, "
+            "and the joint to treat is named."
         )
     return (
-        "Nothing tells where the channels measure and along which direction, so that there is no relative motion; "
-        "give a setup file with points, directions and lines."
+        "There is no relative motion, because the channels have no place and no direction. "
+        "Give a setup file with points, directions and lines."
     )
 
 

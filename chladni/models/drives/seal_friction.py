@@ -10,8 +10,8 @@ from chladni.signals.errors import ModelError
 #: Where the numbers come from.
 ORIGIN: Final = (
     "three published logs (CC0) of a 3-D printed pneumatic cylinder pushed forward and back at 7 to 15 mm/s against "
-    "1, 4 and 7 bar above ambient; F = A p + offset + Fc z with a Bouc-Wen bristle z at each pressure, A = 4.95 cm^2 "
-    "from force over pressure; Fc(p) is the straight line through the three"
+    "1, 4 and 7 bar above ambient. F = A p + offset + Fc z with a Bouc-Wen bristle z at each pressure. A = 4.95 cm^2 "
+    "is from force over pressure. Fc(p) is the straight line through the three"
 )
 #: N, and N/Pa: friction without pressure, and its gradient with it.
 _PRELOAD: Final = 3.67

@@ -114,7 +114,7 @@ def test_no_joint_is_named_that_only_the_order_of_channels_suggests() -> None:
     for names in ((), ("/a.z", "/b.z", "/c.z")):
         text = " ".join(summary_of(mode_set(shapes, names=names)))
         assert "against each other" not in text
-        assert "give a setup file with points, directions and lines" in text
+        assert "Give a setup file with points, directions and lines" in text
 
 
 def test_many_machines_take_one_sentence() -> None:
