@@ -82,6 +82,9 @@ def compare_logs(
         When the logs share no channel at the same sample rate, or modes are asked for and can't be identified.
     """
     ready_made = all(not log.channels and log.functions is not None for log in (before, after))
+    if not ready_made:
+        # Channels are matched by name: what a word names in the one log has that name in the other.
+        channels, references = (words and before.names(words) for words in (channels, references))
     pairs = [] if ready_made else _matched_densities(before, after, channels, resolution_hz)
     progress(0.5)
     compared = tuple(compare_densities(old, new) for old, new in pairs)

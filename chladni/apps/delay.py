@@ -32,7 +32,7 @@ def log_delays(
     EstimateError
         As `time_delay` does.
     """
-    (first,) = log.names([reference])
+    first = log.name(reference)
     notes: tuple[str, ...] = ()
     if responses is None:
         series = _of_its_unit(log, first, span)

@@ -6,7 +6,8 @@ from dataclasses import replace
 from chladni.apps.sources import Span, Watched, no_progress, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
-from chladni.signals.channel import Channel, find_channel
+from chladni.signals.channel import Channel, find_channels
+from chladni.signals.channel_names import places_of
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.time_series import TimeSeries
@@ -85,10 +86,10 @@ def stored_functions(
     held = None if isinstance(source, TimeSeries) else source.functions
     if held is None:
         return None
-    known = {channel.name for channel in (*held.responses, *held.references)}
-    if source.channels and not known.issuperset((*(references or ()), *(responses or ()))):
-        return None
+    known = [channel.name for channel in (*held.responses, *held.references)]
     try:
+        if source.channels and not all(places_of(word, known) for word in (*(references or ()), *(responses or ()))):
+            return None
         chosen = held if responses is None else held.select(list(responses))
         return chosen if references is None else _of_references(chosen, references)
     except EstimateError as error:
@@ -96,7 +97,7 @@ def stored_functions(
 
 
 def _of_references(functions: FrequencyResponse, references: Sequence[str]) -> FrequencyResponse:
-    columns = [find_channel(functions.references, name, role="reference") for name in references]
+    columns = find_channels(functions.references, references, role="reference")
     return replace(
         functions,
         values=functions.values[:, columns],

@@ -66,7 +66,7 @@ def track_orders(
     EstimateError
         When no channel is left to track, or an argument is out of its range.
     """
-    (name,) = log.names([shaft])
+    name = log.name(shaft)
     (told,) = log.read_groups([name], start_s=span.start_s, end_s=span.end_s)
     try:
         turned = rotation(told, **({telling: name} | how))

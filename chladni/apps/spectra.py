@@ -264,6 +264,7 @@ def transfer(
         references = _told_excitations(source, span)
     names = None if responses is None else tuple(dict.fromkeys((*references, *responses)))
     if isinstance(source, TimeSeries):
+        references = source.names(references)
         spectra = averaging.spectra(_of_series(source, names, span), references)
         return frequency_response(
             spectra,
@@ -307,7 +308,7 @@ def log_deflection(
     EstimateError
         As `deflection_shapes` does.
     """
-    references = log.names([reference])
+    references = (log.name(reference),)
     names = None if channels is None else tuple(dict.fromkeys((*references, *channels)))
     grid = _grid_of(log, references, names, span, progress)
     try:

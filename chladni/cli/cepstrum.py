@@ -59,7 +59,7 @@ def cepstrum(
 
 
 def _print_peaks(out: Output, found: "Cepstrum") -> None:
-    out.table(
+    out.channel_table(
         f"{found.kind.capitalize()} cepstrum: {found.provenance.averages} averages, quefrencies up to "
         f"{number(1e3 * float(found.quefrency_s[-1]))} ms",
         ["channel", "peaks, the highest first [ms]", "one over them [Hz]"],

@@ -35,6 +35,36 @@ def grouped_rows(rows: Sequence[Sequence[str]], *, most: int = ROWS_SHOWN_SINGLY
     return [[braced([row[0] for row in members]), *cells] for cells, members in alike]
 
 
+def told_once(names: Sequence[str]) -> tuple[str, list[str]]:
+    """Part what all names share from what tells them apart.
+
+    Parameters
+    ----------
+    names
+        Cells of a column that begin with a channel's name.
+
+    Returns
+    -------
+    shared : str
+        With ``…`` in the place of what differs; empty where nothing is saved, or all names are the same.
+    rest : list of str
+        What stands there, in their order.
+
+    Examples
+    --------
+    >>> told_once(["/daq.ch1", "/daq.ch2"]), told_once(["/a.x", "/b.y"])
+    (('/daq.…', ['ch1', 'ch2']), ('', ['/a.x', '/b.y']))
+    """
+    different = list(dict.fromkeys(names))
+    if len(different) < 2:
+        return "", list(names)
+    head, tail = _shared_ends(different)
+    # A single slash told apart makes names harder to read, not easier.
+    if len(head) + len(tail) < 2:
+        return "", list(names)
+    return f"{head}…{tail}", [name[len(head) : len(name) - len(tail)] for name in names]
+
+
 def braced(names: Sequence[str]) -> str:
     """Write what names have in common once, the rest in braces, as a shell would.
 
@@ -45,11 +75,15 @@ def braced(names: Sequence[str]) -> str:
     """
     if len(names) == 1:
         return names[0]
-    head = _common_start(names)
-    # From the back, so that nothing is counted to both ends.
-    tail = _common_start([name[len(head) :][::-1] for name in names])[::-1]
+    head, tail = _shared_ends(names)
     middles = _runs([name[len(head) : len(name) - len(tail)] for name in names])
     return f"{head}{{{', '.join(middles)}}}{tail}"
+
+
+def _shared_ends(names: Sequence[str]) -> tuple[str, str]:
+    head = _common_start(names)
+    # From the back, so that nothing is counted to both ends.
+    return head, _common_start([name[len(head) :][::-1] for name in names])[::-1]
 
 
 def _runs(names: list[str]) -> list[str]:

@@ -31,12 +31,7 @@ def compare(
     after: Annotated[Path, typer.Argument(metavar="AFTER", help="Another of the same channels.", show_default=False)],
     *,
     channel: options.Channels = None,
-    reference: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PATH", help="Channel of the excitation; a force is taken if not given.", show_default=False
-        ),
-    ] = None,
+    reference: options.References = None,
     resolution: options.Resolution = None,
     modes: Annotated[bool, typer.Option("--modes", help="Identify the modes of both and compare them, too.")] = False,
     operational: Annotated[
@@ -92,7 +87,7 @@ def _save_figures(out: Output, found: "LogComparison", folder: Path) -> None:
 
 
 def _print_levels(out: Output, changes: "Sequence[LevelChange]") -> None:
-    out.table(
+    out.channel_table(
         "Levels (RMS)",
         ["channel", "before", "after", "unit", "change [dB]", "significant"],
         [
@@ -126,7 +121,7 @@ def _print_peaks(out: Output, title: str, changes: "Sequence[PeakChange]") -> No
     ]
     if len(told) > MOST_ROWS:
         title = f"{title}: {MOST_ROWS} of {len(told)} changes, all of them with --json"
-    out.table(title, ["channels", "what", "before [Hz]", "after [Hz]", "shift [Hz]"], rows)
+    out.channel_table(title, ["channels", "what", "before [Hz]", "after [Hz]", "shift [Hz]"], rows)
 
 
 def _print_modes(out: Output, changes: "Sequence[ModeChange]") -> None:

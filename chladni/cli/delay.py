@@ -20,12 +20,12 @@ def delay(
     log: options.Log,
     *,
     reference: Annotated[
-        str, typer.Option(metavar="PATH", help="Channel that the others are held against.", show_default=False)
+        str, typer.Option(metavar="NAME", help="Channel that the others are held against.", show_default=False)
     ],
     response: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="PATH",
+            metavar="NAME",
             help="Only this channel; may be repeated. All of its unit if not given.",
             show_default=False,
         ),
@@ -74,7 +74,7 @@ def delay(
 
 
 def _print_delays(out: Output, found: "TimeDelays") -> None:
-    out.table(
+    out.channel_table(
         f"Delay after {found.reference.name}, from {number(found.band_hz[0])} to {number(found.band_hz[1])} Hz",
         ["channel", "delay [ms]", "mean coherence", "sign"],
         [

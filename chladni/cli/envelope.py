@@ -101,7 +101,7 @@ def _bearing(text: str) -> "Bearing":
 
 
 def _print_bands(out: Output, found: "LogEnvelopes") -> None:
-    out.table(
+    out.channel_table(
         "Squared envelopes: band, spectral kurtosis there, and what repeats",
         ["channel", "band [Hz]", "spectral kurtosis", "line spacing [Hz]", "peaks, the highest first [Hz]"],
         [

@@ -20,18 +20,8 @@ if TYPE_CHECKING:
 def frf(
     log: options.Log,
     *,
-    reference: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PATH",
-            help="Channel of the excitation; may be repeated. A force is taken if not given.",
-            show_default=False,
-        ),
-    ] = None,
-    response: Annotated[
-        list[str] | None,
-        typer.Option(metavar="PATH", help="Only this response; may be repeated.", show_default=False),
-    ] = None,
+    reference: options.References = None,
+    response: options.Responses = None,
     estimator: Annotated[
         Literal["H1", "H2", "Hv"],
         typer.Option(help="H1: noise on the response; H2: noise on the reference; Hv: on both."),
@@ -118,7 +108,9 @@ def _print_peaks(out: Output, response: "FrequencyResponse", peaks: "tuple[Peak,
     # A single reference is the same in every row, and its place is the title.
     alone = len(response.references) == 1
     over = f" over {response.references[0].name}" if alone else ""
-    out.table(
+    # What tells one function apart is two names.
+    table = out.channel_table if alone else out.table
+    table(
         f"Peaks of the magnitude{over}, the highest first{cut}{judged}",
         [
             "response" if alone else "response / reference",

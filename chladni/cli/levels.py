@@ -91,7 +91,7 @@ def levels(
 
 def _print_levels(out: Output, found: "Levels") -> None:
     for column, (low_hz, high_hz) in enumerate(found.bands_hz):
-        out.table(
+        out.channel_table(
             f"Levels about the mean, {number(low_hz)} to {number(high_hz)} Hz",
             ["channel", "RMS", "unit", "mean", "peak", "peak to peak", "crest factor", "skewness", "kurtosis"],
             [
@@ -122,7 +122,7 @@ def _print_severity(out: Output, found: "Severity") -> None:
         f"{pair} {limit:g}" for pair, limit in zip(("A/B", "B/C", "C/D"), found.boundaries_mm_s, strict=False)
     )
     by = f", zones of ISO 20816-3 for {found.machine}: {limits} mm/s" if found.zones else ""
-    out.table(
+    out.channel_table(
         f"Vibration severity, velocity RMS from {number(found.band_hz[0])} to {number(found.band_hz[1])} Hz{by}",
         ["channel", "velocity RMS [mm/s]", *zoned],
         [

@@ -20,7 +20,7 @@ def print_modes(out: Output, modes: "ModeSet", validation: "ModeValidation") -> 
     if not modes.frequency_hz.size:
         # The findings begin with it, and say why.
         return
-    out.table(
+    out.channel_table(
         _title(modes),
         ["mode", "frequency [Hz]", "damping ratio [%]", "MPC", "greatest at", *_scale_column(modes)],
         [
@@ -34,6 +34,7 @@ def print_modes(out: Output, modes: "ModeSet", validation: "ModeValidation") -> 
             ]
             for row in range(modes.frequency_hz.size)
         ],
+        named=4,
     )
 
 

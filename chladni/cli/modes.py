@@ -24,19 +24,11 @@ MethodName = Literal["plscf", "circle-fit", "half-power", "ssi-cov", "fdd", "efd
 def modes(
     log: options.Log,
     *,
-    reference: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PATH", help="Channel of the excitation; a force is taken if not given.", show_default=False
-        ),
-    ] = None,
+    reference: options.References = None,
     operational: Annotated[
         bool, typer.Option("--operational", help="Use responses alone: the excitation wasn't measured.")
     ] = False,
-    channel: Annotated[
-        list[str] | None,
-        typer.Option(metavar="PATH", help="Only this response; may be repeated.", show_default=False),
-    ] = None,
+    channel: options.Channels = None,
     band: Annotated[
         tuple[float, float] | None,
         typer.Option(metavar="LO-HI", help="Only modes between these frequencies, in Hz.", show_default=False),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def ods(
     log: options.Log,
     *,
-    reference: Annotated[str, typer.Option(metavar="PATH", help="Channel whose phase is 0.", show_default=False)],
+    reference: Annotated[str, typer.Option(metavar="NAME", help="Channel whose phase is 0.", show_default=False)],
     channel: options.Channels = None,
     frequency: Annotated[
         list[float] | None,
@@ -62,7 +62,7 @@ def _print_shapes(out: Output, found: "DeflectionShapes") -> None:
     import numpy as np
 
     for row, frequency_hz in enumerate(found.frequency_hz.tolist()):
-        out.table(
+        out.channel_table(
             f"At {number(frequency_hz, digits=6)} Hz, phases over {found.reference}",
             ["channel", "RMS", "unit", "phase [deg]", "coherence"],
             [

@@ -38,7 +38,30 @@ Csv = Annotated[
 ]
 Channels = Annotated[
     list[str] | None,
-    typer.Option("--channel", metavar="PATH", help="Only this channel; may be repeated.", show_default=False),
+    typer.Option(
+        "--channel",
+        metavar="NAME",
+        help="Only this channel, by name, unique ending (ch1) or pattern ('*/accel.x'); may be repeated.",
+        show_default=False,
+    ),
+]
+References = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--reference",
+        metavar="NAME",
+        help="Channel of the excitation, named as a channel is; may be repeated. A force is taken if not given.",
+        show_default=False,
+    ),
+]
+Responses = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--response",
+        metavar="NAME",
+        help="Only this response, by name, unique ending (ch1) or pattern ('*/accel.x'); may be repeated.",
+        show_default=False,
+    ),
 ]
 Resolution = Annotated[
     float | None,

@@ -20,7 +20,7 @@ def orders(
     log: options.Log,
     *,
     tacho: Annotated[
-        str | None, typer.Option(metavar="PATH", help="Channel of pulses of the shaft.", show_default=False)
+        str | None, typer.Option(metavar="NAME", help="Channel of pulses of the shaft.", show_default=False)
     ] = None,
     pulses: Annotated[float, typer.Option(metavar="N", help="Pulses a revolution.")] = 1.0,
     threshold: Annotated[
@@ -28,14 +28,14 @@ def orders(
         typer.Option(metavar="LEVEL", help="What a pulse passes; midway if not given.", show_default=False),
     ] = None,
     phase: Annotated[
-        str | None, typer.Option(metavar="PATH", help="Channel of the shaft's angle.", show_default=False)
+        str | None, typer.Option(metavar="NAME", help="Channel of the shaft's angle.", show_default=False)
     ] = None,
     speed: Annotated[
-        str | None, typer.Option(metavar="PATH", help="Channel of the shaft's speed.", show_default=False)
+        str | None, typer.Option(metavar="NAME", help="Channel of the shaft's speed.", show_default=False)
     ] = None,
     ridge: Annotated[
         str | None,
-        typer.Option(metavar="PATH", help="A vibration that tells it by one of its orders.", show_default=False),
+        typer.Option(metavar="NAME", help="A vibration that tells it by one of its orders.", show_default=False),
     ] = None,
     ridge_order: Annotated[float, typer.Option(metavar="ORDER", help="Which order the ridge is.")] = 1.0,
     ridge_band: Annotated[
@@ -135,7 +135,7 @@ def _print_cuts(out: Output, cuts: "OrderCuts") -> None:
                     number(float(cuts.time_s[at])),
                 ]
             )
-    out.table(
+    out.channel_table(
         f"Orders from {number(slowest)} to {number(fastest)} rpm, where each is highest",
         ["channel", "order", "peak amplitude", "unit", "at [rpm]", "frequency [Hz]", "time [s]"],
         rows,

@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from chladni.cli.channel_rows import told_once
 from chladni.cli.places import require_places
 from chladni.io.atomic import Place, atomic_write
 from chladni.signals.errors import LogError, SetupError
@@ -125,6 +126,16 @@ class Output:
         self.console.print(table)
         if len(rows) > MOST_ROWS:
             self.line(f"... and {counted(len(rows) - MOST_ROWS, 'more row')}; --json FILE holds all of them")
+
+    def channel_table(
+        self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], *, named: int = 0
+    ) -> None:
+        """Print a table with channels' names in a column; what they share is told once, in its heading."""
+        shared, rest = told_once([row[named] for row in rows])
+        if shared:
+            columns = [f"{one} {shared}" if place == named else one for place, one in enumerate(columns)]
+            rows = [[*row[:named], name, *row[named + 1 :]] for name, row in zip(rest, rows, strict=True)]
+        self.table(title, columns, rows)
 
     def pictures(
         self,

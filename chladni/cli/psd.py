@@ -74,7 +74,7 @@ def _print_levels(out: Output, density: "PowerSpectralDensity", document: "Docum
     account = density.provenance
     spacing_hz = float(density.frequency_hz[1] - density.frequency_hz[0])
     names = {channel.name for channel in density.channels}
-    out.table(
+    out.channel_table(
         f"Levels: {account.averages} averages ({account.effective_averages:.1f} effective) of "
         f"{account.segment_s:.6g} s, window {account.window}, lines {number(spacing_hz)} Hz apart",
         ["channel", "RMS", "unit", "highest peak [Hz]", "density there", "unit"],
@@ -102,7 +102,7 @@ def _print_peaks(out: Output, found: "UnitPeaks") -> None:
         out.line(f"No peak stands out of the scatter{where}{judged}.")
         return
     at_most = f", {MOST_PEAKS} at most" if len(found.peaks) == MOST_PEAKS else ""
-    out.table(
+    out.channel_table(
         f"Peaks{where}, the highest first{at_most}{judged}",
         ["strongest in", "frequency [Hz]", "density", "unit"],
         [

@@ -78,7 +78,7 @@ def srs(
 def _print_highest(out: Output, found: "ShockResponse") -> None:
     lines, rows = found.maximax.argmax(axis=1), range(len(found.channels))
     low_hz, high_hz = (number(float(found.frequency_hz[end])) for end in (0, -1))
-    out.table(
+    out.channel_table(
         f"Shock response, {found.quantity.replace('-', ' ')}, Q = {number(found.q)}, from {low_hz} to {high_hz} Hz",
         ["channel", "maximax", "at [Hz]", "positive", "negative", "unit", "taken off first"],
         [

@@ -82,7 +82,7 @@ def _print_checks(out: Output, found: "Sequence[Tolerated]", unit: str) -> None:
 
     factor, _ = si_factor(unit)
     profile = found[0].check.profile
-    out.table(
+    out.channel_table(
         f"Profile of {number(profile.rms() / factor)} {unit} RMS, +{number(profile.upper_db)} -"
         f"{number(profile.lower_db)} dB",
         ["channel", "RMS", "unit", "lines outside [%]", "highest [dB]", "at [Hz]", "lowest [dB]", "at [Hz]",

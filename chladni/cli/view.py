@@ -21,12 +21,7 @@ def view(
     ],
     *,
     channel: options.Channels = None,
-    reference: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PATH", help="Channel of the excitation; a force is taken if not given.", show_default=False
-        ),
-    ] = None,
+    reference: options.References = None,
     resolution: options.Resolution = None,
     start: options.Start = None,
     end: options.End = None,

@@ -53,7 +53,7 @@ def zoom(
 
 def _print_highest(out: Output, found: "Sequence[AmplitudeSpectrum]") -> None:
     first = found[0]
-    out.table(
+    out.channel_table(
         f"Highest line from {number(float(first.frequency_hz[0]))} to {number(float(first.frequency_hz[-1]))} Hz",
         ["channel", "frequency [Hz]", f"{first.quantity} amplitude", "unit"],
         [

@@ -11,7 +11,7 @@ from chladni.io.arrival import arrival_order
 from chladni.io.batch_messages import BatchLayout
 from chladni.io.channel_source import ChannelSource
 from chladni.io.loss import Unread
-from chladni.io.message_path import MessagePath, near_matches, parse_message_path
+from chladni.io.message_path import MessagePath, parse_message_path, starts_with_topic
 from chladni.io.messages import Messages
 from chladni.io.number_lists import NumberLists
 from chladni.io.publishers import at_once, evenly_in_turn
@@ -28,7 +28,9 @@ from chladni.io.stamps import (
 from chladni.io.stream import Stream
 from chladni.io.topic import Topic, apart, read_arrivals, read_earlier_heads, read_heads, topics_of
 from chladni.io.topic_channels import TopicChannels, topic_channels
-from chladni.signals.errors import LogError, SetupError
+from chladni.signals.channel_names import is_pattern, places_of, unknown
+from chladni.signals.errors import EstimateError, LogError, SetupError
+from chladni.signals.wording import near_matches
 
 #: Channels that a log may list; MCAP numbers its own with 16 bits.
 MOST_LISTED: Final = 1 << 16
@@ -78,6 +80,31 @@ class Catalog:
     start_ns: int
     publishers: Mapping[str, tuple[str, ...]]
     in_turn: Mapping[str, tuple[str, ...]]
+
+    def named(self, words: Sequence[str]) -> tuple[ChannelSource, ...]:
+        """Find the channels that words name: a message path, or what `places_of` finds among those listed.
+
+        Raises
+        ------
+        LogError
+            When a word names none, or an ending several.
+        """
+        listed = [source.channel.name for source in self.channels]
+        found = [source for word in dict.fromkeys(words) for source in self._named(word, listed)]
+        return tuple({source.channel.name: source for source in found}.values())
+
+    def _named(self, word: str, listed: Sequence[str]) -> tuple[ChannelSource, ...]:
+        if not is_pattern(word) and starts_with_topic(word, [*self.topics, *self.refused]):
+            # Said in full: nothing else is meant by it, also where it can't be read.
+            return (self.resolve(word),)
+        try:
+            places = places_of(word, listed)
+        except EstimateError as error:
+            raise LogError(f"{self.file}: {error}") from None
+        if not places and listed and "/" not in word:
+            # No path that is written wrongly.
+            raise LogError(f"{self.file}: {unknown(word, listed)}")
+        return tuple(self.channels[place] for place in places) or (self.resolve(word),)
 
     def resolve(self, path: str) -> ChannelSource:
         """Find the channel that a path names.

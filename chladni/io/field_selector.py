@@ -12,10 +12,10 @@ from chladni.io.message_path import (
     KeyStep,
     MessagePath,
     Operator,
-    near_matches,
     quoted,
 )
 from chladni.signals.errors import LogError
+from chladni.signals.wording import near_matches
 
 NAME_FIELDS = ("name", "names", "joint_names", "channel_names")
 """Fields whose strings name the elements of the arrays beside them (sensor_msgs/JointState and its kin)."""

@@ -16,15 +16,14 @@ from chladni.io.log_info import LogInfo, some_of, unread_sentences
 from chladni.io.log_reader import SampleGrid
 from chladni.io.log_survey import survey_file
 from chladni.io.loss import Loss, Unread
-from chladni.io.message_path import near_matches
 from chladni.io.setup import ChannelSetup, Setup, refined
 from chladni.io.stamps import StampRequest
-from chladni.signals.channel import Channel
-from chladni.signals.errors import LogError, SetupError
+from chladni.signals.channel import Channel, channel_names
+from chladni.signals.errors import EstimateError, LogError, SetupError
 from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.visible import place_of
-from chladni.signals.wording import counted
+from chladni.signals.wording import counted, near_matches
 
 if TYPE_CHECKING:
     from chladni.signals.frequency_response import FrequencyResponse
@@ -157,17 +156,14 @@ class FileLog(Log):
         )
 
     def names(self, paths: Sequence[str]) -> tuple[str, ...]:
-        """Names of channels that are called so or shown so; `LogError` when the file doesn't hold one."""
-        known = [channel.name for channel in self.channels]
+        """Names of the channels that words name; `LogError` when the file doesn't hold one."""
         if not paths:
             raise LogError(f"{self._path.name}: no channel is asked for; name one, or None for all")
         self._require_samples()
-        found: dict[str, None] = {}
-        for name in paths:
-            if (place := place_of(name, known)) is None:
-                raise LogError(f"{self._path.name}: no channel {name!r}; {near_matches(name, known)}")
-            found[known[place]] = None
-        return tuple(found)
+        try:
+            return tuple(dict.fromkeys(channel_names(self.channels, paths)))
+        except EstimateError as error:
+            raise LogError(f"{self._path.name}: {error}") from None
 
     def info(self) -> LogInfo:
         """Look at all samples once and tell whether the file is sound."""

@@ -14,7 +14,8 @@ from chladni.io.mcap.limits import Limits
 from chladni.io.setup import Setup, load_setup
 from chladni.io.stamps import StampRequest
 from chladni.signals.channel import Channel, Names, as_names
-from chladni.signals.errors import LogError
+from chladni.signals.channel_names import require_one
+from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import TimeSeries
 
@@ -295,6 +296,14 @@ class Log(ABC):
     @abstractmethod
     def names(self, paths: Sequence[str]) -> tuple[str, ...]:
         """Names that channels have in what is read; `LogError` when the log doesn't hold one."""
+
+    def name(self, path: str) -> str:
+        """Name of the one channel that a word names; `LogError` when it names none, or several."""
+        names = self.names([path])
+        try:
+            return names[require_one(path, range(len(names)), names)]
+        except EstimateError as error:
+            raise LogError(f"{self.path.name}: {error}") from None
 
     @abstractmethod
     def info(self) -> LogInfo:

@@ -206,7 +206,7 @@ class McapLog(Log):
         content = self._content
         if paths is not None and not paths:
             raise LogError(f"{self.path.name}: no channel is asked for; name one, or None for all")
-        sources = content.channels if paths is None else tuple(content.resolve(path) for path in dict.fromkeys(paths))
+        sources = content.channels if paths is None else content.named(paths)
         if not sources:
             reasons = "; ".join(unread_sentences(content.unread)[:3])
             raise LogError(

@@ -9,8 +9,8 @@ from typing import Literal
 
 from chladni.signals.errors import LogError
 from chladni.signals.text_reading import real_number
-from chladni.signals.visible import as_meant, visible
-from chladni.signals.wording import near_words
+from chladni.signals.visible import as_meant
+from chladni.signals.wording import near_matches
 
 Operator = Literal["==", "!=", "<", "<=", ">", ">="]
 FilterValue = str | float | bool
@@ -128,6 +128,17 @@ def parse_message_path(text: str, topics: Collection[str]) -> MessagePath:
     return MessagePath(text=text, topic=topic, steps=tuple(steps))
 
 
+def starts_with_topic(text: str, topics: Collection[str]) -> bool:
+    """Whether a path begins with one of the log's topics.
+
+    Examples
+    --------
+    >>> starts_with_topic("/imu.x", ["/imu"]), starts_with_topic("imu.x", ["/imu"])
+    (True, False)
+    """
+    return any(_length_of(topic, as_meant(text)) is not None for topic in topics)
+
+
 def quoted(name: str) -> str:
     r"""Write a field or column name so that it parses back to itself.
 
@@ -166,22 +177,6 @@ def in_quotes(name: str) -> str:
     """Write a name or a text in quotes, as paths read it."""
     escaped = name.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'
-
-
-def near_matches(word: str, known: Collection[str], *, count: int = 3) -> str:
-    """Name what comes near `word`, or the first few of what there is, as they are shown.
-
-    Examples
-    --------
-    >>> near_matches("/imu.linear_accel.x", ["/imu.linear_acceleration.x", "/odom.x"])
-    'did you mean /imu.linear_acceleration.x?'
-    """
-    near = near_words(word, dict.fromkeys(known), count=count, cutoff=0.6)
-    if near:
-        return f"did you mean {' or '.join(map(visible, near))}?"
-    first = sorted(known)[:8]
-    more = f" and {len(known) - len(first)} more" if len(known) > len(first) else ""
-    return f"there are: {', '.join(map(visible, first))}{more}" if first else "there are none"
 
 
 def _topic_of(text: str, topics: Collection[str]) -> tuple[str, int]:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from chladni.io.batch_messages import BatchLayout
-from chladni.io.message_path import near_matches
 from chladni.io.toml_reader import read_toml, tables
 from chladni.signals.channel import Channel, Role, Vector, unit_direction
 from chladni.signals.errors import SetupError
@@ -14,7 +13,7 @@ from chladni.signals.geometry import Geometry, Point
 from chladni.signals.unit_labels import quantity_of_name, read_label
 from chladni.signals.unit_text import in_unit
 from chladni.signals.units import parse_quantity, quantity_by, quotient, si_factor
-from chladni.signals.wording import shown
+from chladni.signals.wording import near_matches, shown
 
 if TYPE_CHECKING:
     from chladni.io.setup_file import BatchTable, ChannelTable

@@ -29,7 +29,6 @@ from chladni.io.message_path import (
     MessagePath,
     element_text,
     in_quotes,
-    near_matches,
     quoted,
     topic_text,
 )
@@ -38,6 +37,7 @@ from chladni.io.publishers import at_once
 from chladni.io.selected_numbers import element_names, list_places, select
 from chladni.io.topic import Topic
 from chladni.signals.errors import LogError
+from chladni.signals.wording import near_matches
 
 _MARK: Final = re.compile(r'"(?:[^"\\]|\\.)*"|\[\]')
 

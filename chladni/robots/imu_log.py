@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from chladni.io.message_path import near_matches, topic_text
+from chladni.io.message_path import topic_text
 from chladni.robots.floating_base import floating_base
 from chladni.signals.errors import LogError
 from chladni.signals.resampling import join_resampled
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.visible import visible
+from chladni.signals.wording import near_matches
 
 if TYPE_CHECKING:
     from chladni.io.log import Log

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from chladni.io.known_schemas import is_command
-from chladni.io.message_path import near_matches
 from chladni.signals.errors import LogError
 from chladni.signals.resampling import join_resampled
 from chladni.signals.visible import visible
+from chladni.signals.wording import near_matches
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence

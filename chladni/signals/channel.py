@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from math import frexp, inf, isfinite, ldexp, sqrt
 from typing import Final, Literal, Self
 
+from chladni.signals.channel_names import is_pattern, places_of, require_one, unknown
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.units import si_factor
-from chladni.signals.visible import place_of
 from chladni.signals.wording import counted, shown
 
 Role = Literal["response", "reference"]
@@ -80,17 +80,37 @@ def as_names(names: Names) -> tuple[str, ...]:
 
 
 def find_channel(channels: Sequence[Channel], name: str, *, role: str = "channel") -> int:
-    """Row of the channel that is called so or shown so; `EstimateError` naming those there are when it's missing."""
+    """Row of the one channel that a word names, see `places_of`; `EstimateError` when it names none or several."""
     names = [channel.name for channel in channels]
-    if (row := place_of(name, names)) is not None:
-        return row
-    raise EstimateError(f"no {role} {name!r}; {role}s: {', '.join(names)}")
+    return require_one(name, _found(name, names, role), names, role=role)
 
 
 def find_channels(channels: Sequence[Channel], names: Names, *, role: str = "channel") -> list[int]:
-    """Rows of the channels, each as `find_channel` finds it, in one look at all of them."""
-    rows = {channel.name: row for row, channel in reversed(list(enumerate(channels)))}
-    return [rows[name] if name in rows else find_channel(channels, name, role=role) for name in as_names(names)]
+    """Rows of the channels that words name, see `places_of`, in one look at all of them.
+
+    A channel that a pattern names, too, comes once.
+
+    Raises
+    ------
+    EstimateError
+        When a word names none, or an ending several.
+    """
+    known = [channel.name for channel in channels]
+    rows = {name: row for row, name in reversed(list(enumerate(known)))}
+    words = as_names(names)
+    found = [row for word in words for row in ([rows[word]] if word in rows else _found(word, known, role))]
+    return list(dict.fromkeys(found)) if any(map(is_pattern, words)) else found
+
+
+def channel_names(channels: Sequence[Channel], names: Names, *, role: str = "channel") -> tuple[str, ...]:
+    """Names of the channels that words name, as `find_channels` finds them."""
+    return tuple(channels[row].name for row in find_channels(channels, names, role=role))
+
+
+def _found(word: str, known: Sequence[str], role: str) -> tuple[int, ...]:
+    if places := places_of(word, known, role=role):
+        return places
+    raise EstimateError(unknown(word, known, role=role))
 
 
 def require_channels(channels: Sequence[Channel]) -> None:

@@ -9,7 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chladni.signals.arrays import Mask, Real, Whole
-from chladni.signals.channel import UNKNOWN, Channel, Names, Units, as_names, find_channel, made_channels, numbered
+from chladni.signals.channel import (
+    UNKNOWN,
+    Channel,
+    Names,
+    Units,
+    as_names,
+    channel_names,
+    find_channel,
+    find_channels,
+    made_channels,
+    numbered,
+)
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Coordinate, Value, of_channel, require_shape
 from chladni.signals.wording import counted
@@ -185,9 +196,13 @@ class TimeSeries(Value):
         """Row of the named channel; `EstimateError` naming the channels there are when it's missing."""
         return find_channel(self.channels, name)
 
+    def names(self, words: Names) -> tuple[str, ...]:
+        """Names of the channels that words name: whole names, unique endings, patterns; `EstimateError` when none."""
+        return channel_names(self.channels, words)
+
     def select(self, names: Names) -> Self:
-        """Give the named channels, in the order asked for."""
-        rows = [self.index(name) for name in as_names(names)]
+        """Give the channels that words name, in the order asked for."""
+        rows = find_channels(self.channels, names)
         valid = None if self.valid is None else self.valid[rows]
         return replace(
             self, values=self.values[rows], valid=valid, channels=tuple(self.channels[row] for row in rows)

@@ -1,10 +1,12 @@
 """Counts, bounds, values and near words in sentences."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from itertools import islice
 from math import floor, isfinite, log10
 from typing import Final
+
+from chladni.signals.visible import visible
 
 MOST_SHOWN: Final = 60
 """Characters of a foreign value that a message repeats."""
@@ -103,3 +105,19 @@ def near_words(word: str, known: Iterable[str], *, count: int = 1, cutoff: float
         return []
     short = (one for one in known if len(one) <= _LONGEST_WORD)
     return get_close_matches(word, islice(short, _MOST_WORDS), n=count, cutoff=cutoff)
+
+
+def near_matches(word: str, known: Collection[str], *, count: int = 3) -> str:
+    """Name what comes near `word`, or the first few of what there is, as they are shown.
+
+    Examples
+    --------
+    >>> near_matches("/imu.linear_accel.x", ["/imu.linear_acceleration.x", "/odom.x"])
+    'did you mean /imu.linear_acceleration.x?'
+    """
+    near = near_words(word, dict.fromkeys(known), count=count, cutoff=0.6)
+    if near:
+        return f"did you mean {' or '.join(map(visible, near))}?"
+    first = sorted(known)[:8]
+    more = f" and {len(known) - len(first)} more" if len(known) > len(first) else ""
+    return f"there are: {', '.join(map(visible, first))}{more}" if first else "there are none"

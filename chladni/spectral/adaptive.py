@@ -7,6 +7,7 @@ from typing import Generic
 
 import numpy as np
 
+from chladni.signals.channel import find_channels
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.number_range import require_in_range
@@ -160,13 +161,13 @@ def _hammer(series: TimeSeries, references: str | Sequence[str] | None) -> str |
     if references is None:
         names = [channel.name for channel in series.channels if channel.role == "reference"]
     else:
-        names = [references] if isinstance(references, str) else list(references)
+        names = list(series.names(references))
     return names[0] if len(names) == 1 and is_impact_test(series, names[0]) else None
 
 
 def _excitations(series: TimeSeries, references: str | Sequence[str] | None) -> Sequence[int]:
     if references is not None:
-        return [series.index(name) for name in ([references] if isinstance(references, str) else references)]
+        return find_channels(series.channels, references)
     marked = [row for row, channel in enumerate(series.channels) if channel.role == "reference"]
     return marked or range(len(series.channels))
 

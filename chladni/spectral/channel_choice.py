@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from chladni.signals.channel import Names, as_names
+from chladni.signals.channel import Names, channel_names
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 
@@ -28,11 +28,11 @@ def choose_channels(spectra: CrossSpectra, references: Names, responses: Names |
         raise EstimateError(
             "a peak hold keeps no phase between channels; average linearly for responses and coherence"
         )
-    inputs = as_names(references)
+    inputs = channel_names(spectra.channels, references)
     outputs = (
         tuple(channel.name for channel in spectra.channels if channel.name not in inputs)
         if responses is None
-        else as_names(responses)
+        else channel_names(spectra.channels, responses)
     )
     # A response may be a reference too (its row is then a column of ones and zeros), but none is asked for twice.
     for role, names in (("reference", inputs), ("response", outputs)):

@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from chladni.io.source import SeriesLike
-from chladni.signals.channel import Names, as_names
+from chladni.signals.channel import Names, as_names, channel_names
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
@@ -65,24 +65,25 @@ def transmissibility(
             start_s=start_s,
             end_s=end_s,
         )
-    unit = spectra.channels[spectra.index(references)].unit
+    reference = spectra.channels[spectra.index(references)].name
+    unit = spectra.channels[spectra.index(reference)].unit
     if responses is None:
-        chosen = [c.name for c in spectra.channels if c.unit == unit and c.name != references]
+        chosen = [c.name for c in spectra.channels if c.unit == unit and c.name != reference]
     else:
-        chosen = list(as_names(responses))
+        chosen = list(channel_names(spectra.channels, responses))
     if not chosen:
         raise EstimateError(
-            f"no channel but {references!r} is {in_unit(unit)}; transmissibility needs two in one unit"
+            f"no channel but {reference!r} is {in_unit(unit)}; transmissibility needs two in one unit"
         )
     # Checked before arithmetic: a ratio of velocity to acceleration is 1/omega in disguise.
     for name in chosen:
         other = spectra.channels[spectra.index(name)].unit
         if other != unit:
             raise EstimateError(
-                f"{name!r} is {in_unit(other)}, {references!r} {in_unit(unit)}: transmissibility needs one unit; "
+                f"{name!r} is {in_unit(other)}, {reference!r} {in_unit(unit)}: transmissibility needs one unit; "
                 "integrate or differentiate one of them, or ask for a frequency response"
             )
-    response = frequency_response(spectra, references=references, responses=chosen)
+    response = frequency_response(spectra, references=reference, responses=chosen)
     return replace(response, provenance=response.provenance.with_estimator("T1"))
 
 

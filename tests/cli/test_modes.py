@@ -183,7 +183,7 @@ def test_one_function_without_unit_costs_no_other(run, tmp_path):
         (["--start", 0], "arm.uff: holds averaged functions already; leave out resolution"),
         (["--resolution", 0], "arm.uff: holds averaged functions already; leave out resolution"),
         (["--stamp", "log"], "stamp 'log' (--stamp) chooses among the times of messages"),
-        (["--reference", "/x.y"], "no reference '/x.y'; references: /shaker"),
+        (["--reference", "/x.y"], "no reference '/x.y'; there are: /shaker"),
     ],
 )
 def test_options_of_samples_are_refused_for_functions(run, arm_log, tmp_path, option, words):

@@ -12,13 +12,13 @@ from chladni.io.message_path import (
     IndexStep,
     KeyStep,
     element_text,
-    near_matches,
     parse_message_path,
     quoted,
     topic_text,
 )
 from chladni.signals.errors import LogError
 from chladni.signals.visible import as_meant, visible
+from chladni.signals.wording import near_matches
 
 TOPICS = ("/imu", "/imu/wrist", "/a.b", "/a", "/log", "/top floor")
 

@@ -207,7 +207,7 @@ def test_series_select_and_index() -> None:
     assert not both.all_valid()
     assert both.select(["b"]).all_valid()
     assert series().all_valid()
-    with pytest.raises(EstimateError, match="no channel 'c'; channels: a, b"):
+    with pytest.raises(EstimateError, match="no channel 'c'; there are: a, b"):
         both.index("c")
 
 
@@ -259,9 +259,9 @@ def test_units_follow_from_the_channels() -> None:
     assert density().units == ("N^2/Hz", "(m/s^2)^2/Hz")
     assert response().unit(0, 0) == "(m/s^2)/N"
     assert response().function("b", "a") == (0, 0)
-    with pytest.raises(EstimateError, match="no response 'a'; responses: b"):
+    with pytest.raises(EstimateError, match="no response 'a'; there are: b"):
         response().function("a", "b")
-    with pytest.raises(EstimateError, match="no reference 'b'; references: a"):
+    with pytest.raises(EstimateError, match="no reference 'b'; there are: a"):
         response().function("b", "b")
 
 

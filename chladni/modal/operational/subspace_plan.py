@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from chladni.modal.operational.anti_alias import PASS_BAND
-from chladni.signals.channel import find_channel
+from chladni.signals.channel import find_channels
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import SetupError
 from chladni.spectral.peaks import find_peaks
@@ -180,7 +180,7 @@ def _side(channels: int, references: int) -> float:
 
 def _references(spectra: CrossSpectra, names: Sequence[str] | None, band_hz: Band) -> tuple[int, ...]:
     if names is not None:
-        return tuple(dict.fromkeys(find_channel(spectra.channels, name, role="reference") for name in names))
+        return tuple(dict.fromkeys(find_channels(spectra.channels, names, role="reference")))
     count = len(spectra.channels)
     if count <= MOST_REFERENCES:
         return tuple(range(count))

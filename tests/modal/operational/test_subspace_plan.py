@@ -87,7 +87,7 @@ def test_short_records_get_fewer_rows_and_orders():
 
 def test_what_can_not_be_planned_is_told():
     record = resonance((4.0,), 50.0, 200)
-    with pytest.raises(EstimateError, match="no reference '/x'; references: /0, /1, /2"):
+    with pytest.raises(EstimateError, match="no reference '/x'; there are: /0, /1, /2"):
         plan(record, references=["/x"])
     with pytest.raises(SetupError, match="above half the sample rate, 25 Hz"):
         plan(record, band_hz=(30.0, 40.0))
