@@ -59,8 +59,8 @@ def told_once(names: Sequence[str]) -> tuple[str, list[str]]:
     if len(different) < 2:
         return "", list(names)
     head, tail = _shared_ends(different)
-    # A single slash told apart makes names harder to read, not easier.
-    if len(head) + len(tail) < 2:
+    # Where little is saved, parted names are harder to read than whole ones.
+    if len(head) + len(tail) < max(map(len, different)) / 3:
         return "", list(names)
     return f"{head}…{tail}", [name[len(head) : len(name) - len(tail)] for name in names]
 

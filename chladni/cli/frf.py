@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from chladni.cli import options
+from chladni.cli.logs import told_apart
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_drawn
 from chladni.cli.words import number, unit, with_error
 from chladni.signals.wording import counted
 
@@ -18,62 +18,61 @@ if TYPE_CHECKING:
 
 @opens_files
 def frf(
-    log: options.Log,
+    logs: options.Logs,
     *,
     reference: options.References = None,
     response: options.Responses = None,
     estimator: Annotated[
         Literal["H1", "H2", "Hv"],
-        typer.Option(help="H1: noise on the response; H2: noise on the reference; Hv: on both."),
+        typer.Option(
+            case_sensitive=False, help="H1: noise on the response; H2: noise on the reference; Hv: on both."
+        ),
     ] = "H1",
-    resolution: options.Resolution = None,
-    window: options.Window = None,
-    overlap: options.Overlap = None,
-    fmax: options.Fmax = None,
-    start: options.Start = None,
-    end: options.End = None,
+    averages: options.Averages,
+    cut: options.Cut,
+    part: options.Part,
     join: options.Join = "auto",
     opener: Opener,
-    json: options.Json = None,
-    csv: options.Csv = None,
-    figures: options.Figures = None,
-    report: options.Report = None,
-    db: options.Decibels = False,
-    log_frequency: options.LogFrequency = False,
+    targets: options.Targets,
+    looks: options.Looks,
 ) -> None:
-    """Transfer functions and coherence, with their uncertainty."""
+    """Transfer functions and coherence, with their uncertainty; of several logs over one another."""
     from chladni.apps.documents import frf_document
     from chladni.apps.findings import reading_sentences
-    from chladni.apps.sources import Span
-    from chladni.apps.spectra import Averaging, transfer
+    from chladni.apps.spectra import transfer
     from chladni.signals.study import Study
-    from chladni.spectral.bands import up_to
     from chladni.spectral.peaks import find_response_peaks
 
-    out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures, report=report)
-    require_drawn({"--db": db, "--log-frequency": log_frequency}, [figures, report])
-    with opener(log) as opened, out.progress(log.name) as progress:
-        found = transfer(
+    out = targets.output([*logs, opener.setup], looks)
+    studies: list[Study] = []
+    for title, opened, progress in told_apart(logs, opener, out):
+        whole = transfer(
             opened,
             reference,
             response,
             estimator=estimator,
-            averaging=Averaging(resolution_hz=resolution, window=window, overlap=overlap),
-            span=Span(start_s=start, end_s=end, join=join),
+            averaging=averages.averaging(),
+            span=part.span(join=join),
             progress=progress,
         )
-        told = reading_sentences(opened, everything=response is None)
-        geometry = opened.geometry
-    found = up_to(found, fmax)
-    peaks = find_response_peaks(found)
+        (found,) = cut.of([whole])
+        told = (*reading_sentences(opened, everything=response is None), *found.provenance.notes)
+        peaks = find_response_peaks(found)
+        _print_response(out, found, peaks, told)
+        studies.append(
+            Study(title=title, response=found, response_peaks=peaks, geometry=opened.geometry, findings=told)
+        )
+    out.csv([study.response for study in studies if study.response is not None])
+    out.pictures(*studies, figures=targets.figures, report=targets.report, looks=looks)
+    out.documents({one.title: frf_document(one.response, one.response_peaks) for one in studies if one.response})
+
+
+def _print_response(
+    out: Output, found: "FrequencyResponse", peaks: "tuple[Peak, ...]", told: tuple[str, ...]
+) -> None:
     _print_account(out, found)
     _print_peaks(out, found, peaks)
-    findings = told + found.provenance.notes
-    out.lines(findings)
-    study = Study(title=log.name, response=found, response_peaks=peaks, geometry=geometry, findings=findings)
-    out.csv([found])
-    out.pictures(study, figures=figures, report=report, decibels=db, log_frequency=log_frequency)
-    out.json(frf_document(found, peaks))
+    out.lines(told)
 
 
 def _print_account(out: Output, response: "FrequencyResponse") -> None:

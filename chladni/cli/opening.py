@@ -1,7 +1,7 @@
 """How a command opens the files that it reads: options that all of them share, as one value."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from functools import wraps
 from inspect import signature
 from pathlib import Path
@@ -90,22 +90,30 @@ class Opener:
 
 
 def opens_files(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options that say how files are read, in place of its argument `opener`, which gets them.
+    """Give a command the options of its groups (`Opener`, and those of `chladni.cli.options`), in their place.
 
-    An option that the command has itself goes to both.
+    The argument that stands for a group gets it filled. An option that the command has itself goes to both.
     """
     own = signature(command).parameters
-    shared = signature(Opener).parameters
-    added = [one for name, one in shared.items() if name not in own]
+    groups: dict[str, Any] = {name: one.annotation for name, one in own.items() if is_dataclass(one.annotation)}
+    shared = {name: signature(group).parameters for name, group in groups.items()}
 
     @wraps(command)
     def with_options(*given: Any, **named: Any) -> None:
         bound = whole.bind(*given, **named)
         bound.apply_defaults()
-        opener = Opener(**{name: bound.arguments[name] for name in shared})
-        command(**{name: bound.arguments[name] for name in own if name != "opener"}, opener=opener)
+        filled = {
+            name: group(**{option: bound.arguments[option] for option in shared[name]})
+            for name, group in groups.items()
+        }
+        command(**{name: bound.arguments[name] for name in own if name not in groups}, **filled)
 
-    parameters = [one for name, outer in own.items() for one in (added if name == "opener" else (outer,))]
+    parameters = [
+        one
+        for name, outer in own.items()
+        for one in (shared[name].values() if name in groups else [outer])
+        if one is outer or one.name not in own
+    ]
     # Typer reads options off both.
     whole = signature(command).replace(parameters=parameters)
     with_options.__dict__["__signature__"] = whole

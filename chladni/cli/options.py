@@ -4,14 +4,22 @@ import re
 from collections import deque
 from collections.abc import Collection, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.core import TyperCommand
 
 from chladni.signals.text_reading import real_number
+
+if TYPE_CHECKING:
+    from chladni.apps.sources import Span
+    from chladni.apps.spectra import Averaging
+    from chladni.cli.output import Output
+    from chladni.signals.resampling import JoinMethod
+    from chladni.spectral.bands import EstimateT
 
 _NUMBER = r"(\+?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _BAND = re.compile(rf"{_NUMBER}[-:]{_NUMBER}", re.ASCII)
@@ -19,6 +27,14 @@ _BAND = re.compile(rf"{_NUMBER}[-:]{_NUMBER}", re.ASCII)
 Log = Annotated[
     Path,
     typer.Argument(metavar="LOG", help="An MCAP log, or a data file of any kind that is read.", show_default=False),
+]
+Logs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG...",
+        help="An MCAP log, or a data file of any kind that is read; several are drawn over one another.",
+        show_default=False,
+    ),
 ]
 Rate = Annotated[
     float | None,
@@ -98,6 +114,96 @@ Figures = Annotated[
     Path | None,
     typer.Option(metavar="FOLDER", help="Save the figures as PNG and SVG.", show_default=False),
 ]
+
+
+Unit = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--unit",
+        metavar="UNIT",
+        help="Count channels of this quantity so: g, mm/s, kN, ...; once for each quantity. SI if not given.",
+        show_default=False,
+    ),
+]
+Band = Annotated[
+    tuple[float, float] | None,
+    typer.Option(
+        "--band", metavar="LO-HI", help="Leave out all outside, in Hz, levels and peaks included.", show_default=False
+    ),
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Averages:
+    """How spectra are averaged."""
+
+    resolution: Resolution = None
+    window: Window = None
+    overlap: Overlap = None
+
+    def averaging(self) -> "Averaging":
+        """Give it as estimates take it."""
+        from chladni.apps.spectra import Averaging
+
+        return Averaging(resolution_hz=self.resolution, window=self.window, overlap=self.overlap)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cut:
+    """Which lines of a spectrum are told, and in which units."""
+
+    band: Band = None
+    fmax: Fmax = None
+    unit: Unit = None
+
+    def of(self, estimates: "Sequence[EstimateT]") -> "tuple[EstimateT, ...]":
+        """Give the estimates of one log so."""
+        from chladni.signals.shown_units import all_in_units
+        from chladni.spectral.bands import within
+
+        cut = [within(one, band_hz=self.band, highest_hz=self.fmax) for one in estimates]
+        return all_in_units(cut, self.unit)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """Which part of a log is read."""
+
+    start: Start = None
+    end: End = None
+
+    def span(self, *, join: "JoinMethod" = "auto") -> "Span":
+        """Give it as estimates take it."""
+        from chladni.apps.sources import Span
+
+        return Span(start_s=self.start, end_s=self.end, join=join)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Looks:
+    """How the axes of pictures are divided."""
+
+    db: Decibels = False
+    log_frequency: LogFrequency = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Targets:
+    """Where a command writes."""
+
+    json: Json = None
+    csv: Csv = None
+    figures: Figures = None
+    report: Report = None
+
+    def output(self, reads: Sequence[Path | None], looks: Looks | None = None) -> "Output":
+        """Give the output of a command that reads `reads`, once all that it will write is known to have its place."""
+        from chladni.cli.output import Output
+        from chladni.cli.places import require_drawn
+
+        if looks is not None:
+            require_drawn({"--db": looks.db, "--log-frequency": looks.log_frequency}, [self.figures, self.report])
+        return Output.of_log(reads, json=self.json, csv=self.csv, figures=self.figures, report=self.report)
 
 
 class Command(TyperCommand):

@@ -24,6 +24,7 @@ from chladni.signals.wording import counted
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from chladni.cli.options import Looks
     from chladni.signals.study import Study
     from chladni.signals.value import Value
 
@@ -139,27 +140,31 @@ class Output:
 
     def pictures(
         self,
-        study: "Study",
-        *,
+        *studies: "Study",
         figures: Path | None,
         report: Path | None,
-        decibels: bool = False,
-        log_frequency: bool = False,
+        looks: "Looks | None" = None,
     ) -> None:
-        """Save figures and report where they were asked for, and say where they are."""
+        """Save figures and report where they were asked for, and say where they are.
+
+        Those of several logs are drawn over one another; their report names the log with each channel.
+        """
         if figures is None and report is None:
             return
         from chladni.viewers.figures import Album, save_album
         from chladni.viewers.figures.log_axis import Scales
 
-        album = Album.of(study, scales=Scales(decibels=decibels, log_frequency=log_frequency))
+        scales = Scales() if looks is None else Scales(decibels=looks.db, log_frequency=looks.log_frequency)
+        drawn = Album.over_one_another(studies, scales=scales) if len(studies) > 1 else None
+        album = drawn or Album.of(studies[0], scales=scales)
         if figures is not None:
             for path in save_album(album, figures):
                 self.line(f"figure: {path}")
         if report is not None:
+            from chladni.apps.show import gather
             from chladni.viewers.report import write_report
 
-            write_report(study, report, album=album)
+            write_report(studies[0] if len(studies) == 1 else gather(*studies), report, album=album)
             self.line(f"report: {report}")
 
     def figures(self, command: str, drawn: "Mapping[str, Figure]", folder: Path) -> None:
@@ -180,6 +185,14 @@ class Output:
                 file.write(encoded)
             return
         _send(encoded)
+
+    def documents(self, contents: Mapping[str, Mapping[str, Any]]) -> None:
+        """Write the document of one log, or those of several, each with its log's name."""
+        if len(contents) == 1:
+            self.json(*contents.values())
+            return
+        logs = [{"log": name, **content} for name, content in contents.items()]
+        self.json({"format": "chladni.logs/1", "logs": logs})
 
     def csv(self, values: "Sequence[Value]") -> None:
         """Write `values` where ``--csv`` said, and say so; nothing when it wasn't given.

@@ -3,71 +3,65 @@
 from typing import TYPE_CHECKING
 
 from chladni.cli import options
+from chladni.cli.logs import told_apart
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_drawn
 from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
     from chladni.apps.documents import Document
     from chladni.apps.unit_peaks import UnitPeaks
     from chladni.signals.power_spectral_density import PowerSpectralDensity
+    from chladni.signals.study import Study
 
 
 @opens_files
 def psd(
-    log: options.Log,
+    logs: options.Logs,
     *,
     channel: options.Channels = None,
-    resolution: options.Resolution = None,
-    window: options.Window = None,
-    overlap: options.Overlap = None,
-    fmax: options.Fmax = None,
-    start: options.Start = None,
-    end: options.End = None,
+    averages: options.Averages,
+    cut: options.Cut,
+    part: options.Part,
     opener: Opener,
-    json: options.Json = None,
-    csv: options.Csv = None,
-    figures: options.Figures = None,
-    report: options.Report = None,
-    db: options.Decibels = False,
-    log_frequency: options.LogFrequency = False,
+    targets: options.Targets,
+    looks: options.Looks,
 ) -> None:
-    """Averaged power spectral densities with named peaks."""
+    """Averaged power spectral densities with named peaks; of several logs over one another."""
     from chladni.apps.documents import psd_document
     from chladni.apps.findings import reading_sentences
-    from chladni.apps.sources import Span
-    from chladni.apps.spectra import Averaging, densities
+    from chladni.apps.spectra import densities
     from chladni.apps.unit_peaks import unit_peaks
     from chladni.signals.study import Study
-    from chladni.spectral.bands import up_to
 
-    out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures, report=report)
-    require_drawn({"--db": db, "--log-frequency": log_frequency}, [figures, report])
-    with opener(log) as opened, out.progress(log.name) as progress:
-        found = densities(
-            opened,
-            channels=channel,
-            averaging=Averaging(resolution_hz=resolution, window=window, overlap=overlap),
-            span=Span(start_s=start, end_s=end),
-            progress=progress,
+    out = targets.output([*logs, opener.setup], looks)
+    studies: list[Study] = []
+    for title, opened, progress in told_apart(logs, opener, out):
+        spectra = densities(
+            opened, channels=channel, averaging=averages.averaging(), span=part.span(), progress=progress
         )
         told = reading_sentences(opened, everything=channel is None)
-        geometry = opened.geometry
-    found = tuple(up_to(one, fmax) for one in found)
-    document = psd_document(found)
-    named = [group for density in found for group in unit_peaks(density)]
-    for density in found:
+        found = cut.of(spectra)
+        named = [group for density in found for group in unit_peaks(density)]
+        notes = tuple(note for density in found for note in density.provenance.notes)
+        peaks = tuple(peak for group in named for peak in group.peaks)
+        study = Study(title=title, densities=found, peaks=peaks, geometry=opened.geometry, findings=told + notes)
+        _print_study(out, study, named)
+        studies.append(study)
+    out.csv([density for study in studies for density in study.densities])
+    out.pictures(*studies, figures=targets.figures, report=targets.report, looks=looks)
+    out.documents({study.title: psd_document(study.densities) for study in studies})
+
+
+def _print_study(out: Output, study: "Study", named: "list[UnitPeaks]") -> None:
+    from chladni.apps.documents import psd_document
+
+    document = psd_document(study.densities)
+    for density in study.densities:
         _print_levels(out, density, document)
     for group in named:
         _print_peaks(out, group)
-    notes = tuple(note for density in found for note in density.provenance.notes)
-    out.lines((*told, *notes))
-    peaks = tuple(peak for group in named for peak in group.peaks)
-    study = Study(title=log.name, densities=found, peaks=peaks, geometry=geometry, findings=told + notes)
-    out.csv(found)
-    out.pictures(study, figures=figures, report=report, decibels=db, log_frequency=log_frequency)
-    out.json(document)
+    out.lines(study.findings)
 
 
 def _print_levels(out: Output, density: "PowerSpectralDensity", document: "Document") -> None:

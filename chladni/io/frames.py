@@ -72,7 +72,7 @@ def to_csv(value: Value, path: Path | str) -> None:
         # As logs are converted: with the start of its clock, and read again by `chladni.open`.
         write_csv(value, path)
         return
-    columns = [real for one in _columns(value) for real in _real(one)]
+    columns = [*_row_units(value), *(real for one in _columns(value) for real in _real(one))]
     rows = value.coordinate(value.ROWS)
     titles = [value.ROWS, *(f"{one.name} [{one.unit}]" if one.unit else one.name for one in columns)]
     with atomic_write(path) as file:
@@ -98,6 +98,13 @@ def _columns(value: Value) -> Iterator[_Column]:
             told = " / ".join(label)
             title = " ".join(filter(None, (told, name if place or not told else "")))
             yield _Column(name=title, unit=value.unit_at(name, at), numbers=numbers[(slice(None), *at)])
+
+
+def _row_units(value: Value) -> Iterator[_Column]:
+    """Give the units of rows that are channels, where a column has several."""
+    if value.OF_ROW:
+        units = np.array([channel.unit for channel in getattr(value, value.ROWS)], dtype=object)
+        yield _Column(name="unit", unit="", numbers=units)
 
 
 def _places(value: Value, axes: tuple[str, ...]) -> Iterator[tuple[int, ...]]:

@@ -114,6 +114,7 @@ class Levels(Value):
 
     AXES: ClassVar = dict.fromkeys(("rms", *(one for one in _BY_CHANNEL if one != "rms")), ("channels", "bands_hz"))
     ROWS: ClassVar = "channels"
+    OF_ROW: ClassVar = ("mean", "rms", "rms_std", "peak", "peak_to_peak")
 
     channels: tuple[Channel, ...]
     bands_hz: tuple[tuple[float, float], ...]

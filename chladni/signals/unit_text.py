@@ -19,6 +19,8 @@ Exponents = dict[Factor, int]
 Scaled = tuple[float, Exponents]
 
 MOTION = ("m", "rad")
+# What results may be shown in beside SI: rates of these are written as those of motions are, (mm/s)^2/Hz.
+_MOTION_AS_WRITTEN = (*MOTION, "nm", "um", "mm", "cm", "km", "inch", "in", "mil", "ft", "deg", "mrad")
 SECOND: Factor = ("s", 0)
 
 # Micro and ohm signs have twins among the Greek letters that look the same; both are meant.
@@ -258,7 +260,7 @@ def _settled(exponents: Exponents) -> Exponents:
     for factor in sorted(result, key=lambda factor: (-result[factor], factor)):
         symbol, per_second = factor
         power, seconds = result[factor], result.get(SECOND, 0)
-        if symbol not in MOTION or not seconds or seconds % power:
+        if symbol not in _MOTION_AS_WRITTEN or not seconds or seconds % power:
             continue
         moved = per_second - seconds // power
         if moved < 0 or (power < 0 and per_second == 0):

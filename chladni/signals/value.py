@@ -81,6 +81,8 @@ class Value(Drawn):
         Which of these axes runs down the rows of a table.
     UNITS
         Of these fields, the unit, or what makes it of the unit of a channel on the first axis but `ROWS`.
+    OF_ROW
+        Where rows are channels: the fields in the unit of their row's channel.
     """
 
     __slots__ = ()
@@ -88,6 +90,7 @@ class Value(Drawn):
     AXES: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     ROWS: ClassVar[str] = ""
     UNITS: ClassVar[Mapping[str, str | Callable[[str], str]]] = {}
+    OF_ROW: ClassVar[tuple[str, ...]] = ()
 
     def coordinate(self, axis: str) -> Coordinate:
         """Give what stands along one axis of `AXES`: the numbers of that field, or the names of its channels."""

@@ -11,9 +11,10 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.levels import BandLevels
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.waterfall import Waterfall
 from chladni.spectral.leakage import line_correlation, named_window
 
-EstimateT = TypeVar("EstimateT", PowerSpectralDensity, FrequencyResponse)
+EstimateT = TypeVar("EstimateT", PowerSpectralDensity, FrequencyResponse, Waterfall)
 
 
 def band_rms(density: PowerSpectralDensity, *, bands_hz: Sequence[tuple[float, float]]) -> BandLevels:
@@ -127,8 +128,19 @@ def _uncovered_note(bands: Real, cells: Real) -> tuple[str, ...]:
     return (f"no level for {named}{more}: the spectrum covers {cells[0]:g} to {cells[-1]:g} Hz",)
 
 
-def up_to(estimate: EstimateT, highest_hz: float | None) -> EstimateT:
-    """Give the lines of an estimate up to a frequency, and a note that the others are left out; None leaves it whole.
+def within(
+    estimate: EstimateT, *, band_hz: tuple[float, float] | None = None, highest_hz: float | None = None
+) -> EstimateT:
+    """Give the lines of an estimate in a band, and a note that the others are left out.
+
+    Parameters
+    ----------
+    estimate
+        Over frequency.
+    band_hz
+        Lowest and highest line that stays; None for all.
+    highest_hz
+        Highest line that stays, too; None for all.
 
     Raises
     ------
@@ -136,12 +148,12 @@ def up_to(estimate: EstimateT, highest_hz: float | None) -> EstimateT:
         When that leaves fewer than two lines.
     """
     line_hz = estimate.frequency_hz
-    if highest_hz is None:
-        return estimate
-    kept = line_hz <= highest_hz
+    low_hz, high_hz = band_hz or (0.0, np.inf)
+    kept = (line_hz >= low_hz) & (line_hz <= min(high_hz, np.inf if highest_hz is None else highest_hz))
     if np.count_nonzero(kept) < 2:
+        asked = f"--fmax {highest_hz:g} Hz" if band_hz is None else f"--band {low_hz:g}-{high_hz:g} Hz"
         raise EstimateError(
-            f"--fmax {highest_hz:g} Hz leaves fewer than two lines: they begin at {line_hz[0]:.6g} Hz and are "
+            f"{asked} leaves fewer than two lines: they go from {line_hz[0]:.6g} to {line_hz[-1]:.6g} Hz, "
             f"{np.diff(line_hz).min(initial=np.inf):.6g} Hz apart; ask for more"
         )
     if kept.all():
@@ -150,6 +162,10 @@ def up_to(estimate: EstimateT, highest_hz: float | None) -> EstimateT:
         name: np.compress(kept, getattr(estimate, name), axis=axes.index("frequency_hz"))
         for name, axes in estimate.AXES.items()
     }
-    note = f"lines above {highest_hz:g} Hz are left out, of levels and peaks as well"
+    if band_hz is None:
+        where = f"above {highest_hz:g} Hz"
+    else:
+        where = f"outside {line_hz[kept][0]:.6g} to {line_hz[kept][-1]:.6g} Hz"
+    note = f"lines {where} are left out, of levels and peaks as well"
     account = estimate.provenance.with_notes(note)
     return replace(estimate, frequency_hz=line_hz[kept], provenance=account, **cut)

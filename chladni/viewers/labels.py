@@ -4,6 +4,8 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+from chladni.signals.errors import SetupError
+from chladni.signals.units import si_factor
 from chladni.signals.visible import visible
 
 LONGEST_NAME = 48
@@ -43,10 +45,10 @@ def quantity(unit: str) -> str:
 
     Examples
     --------
-    >>> quantity("m/s^2"), quantity("1")
-    ('Acceleration', 'Signal')
+    >>> quantity("m/s^2"), quantity("g"), quantity("1")
+    ('Acceleration', 'Acceleration', 'Signal')
     """
-    return _QUANTITIES.get(unit, "Signal")
+    return _QUANTITIES.get(_in_si(unit), "Signal")
 
 
 def response_quantity(response_unit: str, reference_unit: str) -> str:
@@ -57,10 +59,21 @@ def response_quantity(response_unit: str, reference_unit: str) -> str:
     >>> response_quantity("m/s^2", "N"), response_quantity("m", "N"), response_quantity("V", "V")
     ('Accelerance', 'Receptance', 'Frequency response')
     """
+    response_unit, reference_unit = _in_si(response_unit), _in_si(reference_unit)
     if reference_unit == "N":
         forms = {"m/s^2": "Accelerance", "m/s": "Mobility", "m": "Receptance"}
         return forms.get(response_unit, "Frequency response")
     return "Transmissibility" if response_unit == reference_unit == "m/s^2" else "Frequency response"
+
+
+def _in_si(unit: str) -> str:
+    """Give the SI unit of what is shown in another one; any text that is no unit as it is."""
+    if unit in _QUANTITIES:
+        return unit
+    try:
+        return si_factor(unit)[1]
+    except SetupError:
+        return unit
 
 
 def amplitude_density_unit(unit: str) -> str:

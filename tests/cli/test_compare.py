@@ -53,7 +53,7 @@ def test_a_long_list_of_changes_is_cut_with_a_word(run, monkeypatch):
     peak = Peak(frequency_hz=10.0, frequency_std_hz=0.1, height=1.0, height_std=0.1, unit="N", channels=("a",))
     gone = PeakChange(fate="vanished", before=peak, after=None, shift_hz=float("nan"), shift_std_hz=float("nan"))
     told = []
-    out = SimpleNamespace(table=lambda title, _columns, rows: told.append((title, len(rows))))
+    out = SimpleNamespace(channel_table=lambda title, _columns, rows: told.append((title, len(rows))))
     compare._print_peaks(out, "Peaks", [gone] * 5)
     assert told == [("Peaks: 2 of 5 changes, all of them with --json", 2)]
 

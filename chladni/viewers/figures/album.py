@@ -1,6 +1,6 @@
 """Figures in sections, each drawn once and rendered once in each format, whoever asks for it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Self
 
 from matplotlib.figure import Figure
@@ -17,6 +17,7 @@ from chladni.viewers.figures.mac import mac_figures
 from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
 from chladni.viewers.figures.octaves import octave_figures
+from chladni.viewers.figures.overlay import overlaid_figures
 from chladni.viewers.figures.relative_motion import relative_motion_figures
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.stabilisation import stabilisation_figures
@@ -63,6 +64,11 @@ class Album:
                 "complexity": complexity_figures(study),
             }
         )
+
+    @classmethod
+    def over_one_another(cls, studies: Sequence[Study], *, scales: Scales = USUAL) -> Self:
+        """Draw the spectra and transfer functions of several logs, a curve for each."""
+        return cls(overlaid_figures(studies, scales=scales))
 
     @property
     def figures(self) -> dict[str, Figure]:
