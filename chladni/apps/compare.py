@@ -1,6 +1,6 @@
 """Two logs, before and after: what changed that scatter doesn't explain."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,13 +12,20 @@ from chladni.apps.spectra import Averaging, densities, transfer
 from chladni.io.log import Log
 from chladni.modal.shapes.mode_comparison import compare_modes
 from chladni.modal.shapes.validation import validate
-from chladni.signals.comparison import DensityComparison, ResponseComparison
+from chladni.signals.comparison import DensityComparison, LevelChange, PeakChange, ResponseComparison
 from chladni.signals.errors import EstimateError
+from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_change import ModeChange
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
+from chladni.signals.study import Study
+from chladni.signals.unit_text import with_unit
+from chladni.signals.wording import with_sigma
 from chladni.spectral.comparison import compare_densities, compare_responses
+from chladni.viewers.labels import short_names
 
+# As many changes as one reads; tables and documents hold all.
+MOST_TOLD = 25
 Densities = tuple[PowerSpectralDensity, ...]
 
 
@@ -36,12 +43,41 @@ class LogComparison:
         What became of each mode; None when modes were not asked for.
     notes
         What could not be compared, and why.
+    before, after
+        The spectra and transfer functions that were compared.
     """
 
     densities: tuple[DensityComparison, ...]
     response: ResponseComparison | None
     notes: tuple[str, ...]
+    before: Study
+    after: Study
     modes: tuple[ModeChange, ...] | None = None
+
+    def sentences(self) -> tuple[str, ...]:
+        """Say which levels and peaks changed by more than scatter explains, those of levels first, then notes."""
+        levels = [one for density in self.densities for one in density.overall if one.significant]
+        peaks = [one for density in self.densities for one in density.peaks if one.fate != "unchanged"]
+        if self.response is not None:
+            peaks += [one for one in self.response.peaks if one.fate != "unchanged"]
+        # As the pictures name them; the document has the names in full.
+        labels = short_names([*(one.channel for one in levels), *(name for one in peaks for name in one.channels)])
+        told = [*(_level_sentence(one, labels) for one in levels), *(_peak_sentence(one, labels) for one in peaks)]
+        more = [f"{len(told) - MOST_TOLD} more changes; all are in the document of --json."] * (len(told) > MOST_TOLD)
+        return (*(told[:MOST_TOLD] or ["Nothing changed that scatter doesn't explain."]), *more, *self.notes)
+
+
+def _level_sentence(one: LevelChange, labels: Mapping[str, str]) -> str:
+    change = with_sigma(one.change_db, one.change_std_db)
+    levels = f"{one.before:.4g} to {with_unit(f'{one.after:.4g}', one.unit)}"
+    return f"The level of {labels[one.channel]} changed by {change} dB, from {levels} RMS."
+
+
+def _peak_sentence(one: PeakChange, labels: Mapping[str, str]) -> str:
+    peak = one.before or one.after
+    where = "" if peak is None else f" at {peak.frequency_hz:.5g} Hz"
+    shift = f" by {with_sigma(one.shift_hz, one.shift_std_hz)} Hz" if one.fate == "moved" else ""
+    return f"The peak{where} of {' over '.join(labels[name] for name in one.channels)} {one.fate}{shift}."
 
 
 def compare_logs(
@@ -103,7 +139,13 @@ def compare_logs(
         response=transferred.comparison,
         modes=changes,
         notes=(*_told([*accounts, *transferred.accounts]), *transferred.reasons, *doubts),
+        before=_study(before, [old for old, _ in pairs], transferred.responses[:1]),
+        after=_study(after, [new for _, new in pairs], transferred.responses[1:]),
     )
+
+
+def _study(log: Log, spectra: Sequence[PowerSpectralDensity], responses: Sequence[FrequencyResponse]) -> Study:
+    return Study(title=log.path.name, densities=tuple(spectra), response=next(iter(responses), None))
 
 
 def _modes(
@@ -188,6 +230,7 @@ class _Transferred:
 
     comparison: ResponseComparison | None = None
     accounts: tuple[tuple[Provenance, Provenance], ...] = ()
+    responses: tuple[FrequencyResponse, ...] = ()
     reasons: tuple[str, ...] = ()
 
 
@@ -208,7 +251,8 @@ def _responses(
             transfer(log, references, responses, estimator="H1", averaging=averaging, span=Span())
             for log in (before, after)
         )
-        return _Transferred(comparison=compare_responses(old, new), accounts=((old.provenance, new.provenance),))
+        accounts = ((old.provenance, new.provenance),)
+        return _Transferred(comparison=compare_responses(old, new), accounts=accounts, responses=(old, new))
     except EstimateError as error:
         to = f" to {', '.join(references)}" if references else ""
         return _Transferred(reasons=(f"transfer functions{to} were not compared: {error}",))

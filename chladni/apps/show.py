@@ -1,8 +1,11 @@
 """Show results in rerun."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+from typing import Any, TypeVar
 
 from chladni.apps.analyse import analyse
 from chladni.apps.gap_evidence import gap_evidence
@@ -17,14 +20,16 @@ from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
+from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.study import Study
-from chladni.signals.time_series import TimeSeries
-from chladni.signals.value import Drawn
+from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.value import Drawn, Value
 from chladni.signals.waterfall import Waterfall
 from chladni.spectral.peaks import find_response_peaks
 from chladni.spectral.power_spectral_density import power_spectral_density
 
+ValueT = TypeVar("ValueT", bound=Value)
 Shown = Log | Drawn | Path | str
 
 # Title of a study that no log has given its name yet.
@@ -98,17 +103,64 @@ def gather(*items: Shown) -> Study:
     if not items:
         raise SetupError("nothing to show; give a log, a series, a spectrum, a transfer function or modes")
     studies = [analyse(item) if isinstance(item, Log | Path | str) else item for item in items]
-    several = sum(isinstance(item, Study) for item in studies) > 1
+    logs = [item for item in studies if isinstance(item, Study)]
     study = Study(title=NAMELESS)
+    if len(logs) > 1:
+        told = _since_their_start(logs)
+        study = replace(study, logs=tuple(one.title for one in logs), findings=told)
+        studies = [_labelled(item, from_start=bool(told)) if isinstance(item, Study) else item for item in studies]
     for item in studies:
-        study = _with(study, _labelled(item) if several and isinstance(item, Study) else item)
+        study = _with(study, item)
     # Last: the geometry that relative motion needs may come after the modes.
     return study if study.modes is None or study.validation is not None else _with_checks(study, study.modes)
 
 
-def _labelled(study: Study) -> Study:
-    """Name the log in its findings, which are about to stand beside those of others."""
-    return replace(study, findings=tuple(f"{study.title}: {finding}" for finding in study.findings))
+def _since_their_start(logs: Sequence[Study]) -> tuple[str, ...]:
+    """Say so when logs were recorded one after another: they are laid over one another then, each from its start."""
+    times = sorted(_times_ns(log) for log in logs if log.series)
+    if len(times) < 2 or all(later[0] < earlier[1] for earlier, later in pairwise(times)):
+        return ()
+    return ("The logs were recorded one after another; each is drawn from its own start.",)
+
+
+def _times_ns(log: Study) -> tuple[int, int]:
+    starts = [one.start_time_ns for one in log.series]
+    ends = [one.start_time_ns + round(one.duration_s * NS_PER_S) for one in log.series]
+    return min(starts), max(ends)
+
+
+def _labelled(study: Study, *, from_start: bool) -> Study:
+    """Name the log in its findings and channels, which are about to stand beside those of others."""
+    zero_ns = _times_ns(study)[0] if from_start and study.series else 0
+
+    def named(value: ValueT) -> ValueT:
+        """Give a value whose channels begin with the log's name."""
+        changed: dict[str, Any] = {
+            field: tuple(one.with_name(of_log(one.name)) for one in getattr(value, field))
+            for field in ("channels", "responses", "references")
+            if isinstance(getattr(value, field, None), tuple)
+        }
+        if zero_ns and isinstance(value, TimeSeries | Waterfall):
+            changed["start_time_ns"] = value.start_time_ns - zero_ns
+        made: ValueT = replace(value, **changed)  # type: ignore[type-var]  # every value is a dataclass
+        return made
+
+    def of_log(name: str) -> str:
+        return f"{study.title}: {name}"
+
+    def peaks(found: tuple[Peak, ...]) -> tuple[Peak, ...]:
+        return tuple(replace(one, channels=tuple(map(of_log, one.channels))) for one in found)
+
+    return replace(
+        study,
+        series=tuple(map(named, study.series)),
+        densities=tuple(map(named, study.densities)),
+        waterfalls=tuple(map(named, study.waterfalls)),
+        response=None if study.response is None else named(study.response),
+        peaks=peaks(study.peaks),
+        response_peaks=peaks(study.response_peaks),
+        findings=tuple(map(of_log, study.findings)),
+    )
 
 
 def _with(study: Study, item: Drawn) -> Study:
@@ -182,4 +234,5 @@ def _joined(first: Study, second: Study) -> Study:
         geometry=second.geometry if second.geometry.points else first.geometry,
         findings=(*first.findings, *second.findings, *replaced),
         pictures=(*first.pictures, *second.pictures),
+        logs=first.logs or second.logs,
     )

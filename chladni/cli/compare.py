@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from chladni.cli import options
+from chladni.cli.logs import log_names
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 from chladni.cli.words import NOTHING, number, unit, with_error
 from chladni.signals.wording import counted
 
@@ -40,13 +40,14 @@ def compare(
     opener: Opener,
     json: options.Json = None,
     figures: options.Figures = None,
+    report: options.Report = None,
 ) -> None:
     """Levels, spectra, transfer functions and modes of two logs side by side, with what is significant."""
     from chladni.apps.compare import compare_logs
     from chladni.apps.documents import comparison_document
 
-    require_places(reads=[before, after, opener.setup], writes={"--json": json}, folders={"--figures": figures})
-    out = Output(json)
+    titles = log_names([before, after])
+    out = Output.of_log([before, after, opener.setup], json=json, figures=figures, report=report)
     opening = opener.among([before, after])
     with (
         opening(before) as old,
@@ -73,17 +74,25 @@ def compare(
     if found.modes is not None:
         _print_modes(out, found.modes)
     out.lines(found.notes)
-    if figures is not None:
-        _save_figures(out, found, figures)
+    _picture(out, found, titles, figures=figures, report=report)
     out.json(comparison_document(found))
 
 
-def _save_figures(out: Output, found: "LogComparison", folder: Path) -> None:
-    from chladni.viewers.figures import Album, comparison_figures, save_album
+def _picture(
+    out: Output, found: "LogComparison", titles: tuple[str, ...], *, figures: Path | None, report: Path | None
+) -> None:
+    """Draw both spectra over one another, and what changed."""
+    if figures is None and report is None:
+        return
+    from dataclasses import replace
 
-    album = Album({"comparison": comparison_figures(found.densities, found.response)})
-    for path in save_album(album, folder):
-        out.line(f"figure: {path}")
+    from chladni.signals.study import Study
+    from chladni.viewers.figures import Album, comparison_figures
+
+    old, new = (replace(one, title=title) for one, title in zip((found.before, found.after), titles, strict=True))
+    album = Album.of_change(old, new, comparison_figures(found.densities, found.response))
+    study = Study(title=" and ".join(titles), findings=found.sentences())
+    out.album(album, study, figures=figures, report=report)
 
 
 def _print_levels(out: Output, changes: "Sequence[LevelChange]") -> None:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from chladni.cli.options import Looks
     from chladni.signals.study import Study
     from chladni.signals.value import Value
+    from chladni.viewers.figures import Album
 
 PROGRESS_AFTER_S = 1.0
 STANDARD_OUTPUT = 1
@@ -151,20 +152,30 @@ class Output:
         """
         if figures is None and report is None:
             return
-        from chladni.viewers.figures import Album, save_album
+        from chladni.viewers.figures import Album
         from chladni.viewers.figures.log_axis import Scales
 
         scales = Scales() if looks is None else Scales(decibels=looks.db, log_frequency=looks.log_frequency)
-        drawn = Album.over_one_another(studies, scales=scales) if len(studies) > 1 else None
-        album = drawn or Album.of(studies[0], scales=scales)
+        if len(studies) == 1:
+            self.album(Album.of(studies[0], scales=scales), studies[0], figures=figures, report=report)
+            return
+        from chladni.apps.show import gather
+
+        whole = gather(*studies)
+        album = Album.over_one_another(whole, studies, scales=scales)
+        self.album(album, whole, figures=figures, report=report)
+
+    def album(self, album: "Album", study: "Study", *, figures: Path | None, report: Path | None) -> None:
+        """Save the figures of an album, and the report that they stand in, where they were asked for."""
         if figures is not None:
+            from chladni.viewers.figures import save_album
+
             for path in save_album(album, figures):
                 self.line(f"figure: {path}")
         if report is not None:
-            from chladni.apps.show import gather
             from chladni.viewers.report import write_report
 
-            write_report(studies[0] if len(studies) == 1 else gather(*studies), report, album=album)
+            write_report(study, report, album=album)
             self.line(f"report: {report}")
 
     def figures(self, command: str, drawn: "Mapping[str, Figure]", folder: Path) -> None:

@@ -1,11 +1,13 @@
 """``chladni view``: everything in rerun."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from chladni.cli import options
+from chladni.cli.logs import log_names
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
@@ -23,8 +25,7 @@ def view(
     channel: options.Channels = None,
     reference: options.References = None,
     resolution: options.Resolution = None,
-    start: options.Start = None,
-    end: options.End = None,
+    part: options.Part,
     opener: Opener,
     save: Annotated[
         Path | None,
@@ -49,22 +50,21 @@ def view(
     )
     out = Output(json)
     opening, studies = opener.among(logs), []
-    for log in logs:
-        with opening(log) as opened, out.progress(log.name) as progress:
-            studies.append(
-                analyse(
-                    opened,
-                    channels=channel,
-                    references=reference,
-                    resolution_hz=resolution,
-                    start_s=start,
-                    end_s=end,
-                    progress=progress,
-                )
+    for title, log in zip(log_names(logs), logs, strict=True):
+        with opening(log) as opened, out.progress(title) as progress:
+            found = analyse(
+                opened,
+                channels=channel,
+                references=reference,
+                resolution_hz=resolution,
+                start_s=part.start,
+                end_s=part.end,
+                progress=progress,
             )
+            studies.append(replace(found, title=title))
     study = gather(*studies)
     out.lines(study.findings)
-    out.pictures(study, figures=figures, report=report)
+    out.pictures(*studies, figures=figures, report=report)
     _show(study, out, save=save, web=web)
 
 

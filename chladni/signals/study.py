@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from chladni.signals.cepstrum import Cepstrum
+from chladni.signals.channel import Channel
 from chladni.signals.envelope import EnvelopeSpectrum
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.geometry import Geometry
@@ -57,6 +58,8 @@ class Study(Drawn):
         Sentences about the log and its spectra: soundness first, then what was seen, then advice.
     pictures
         Titles and PNGs of what has no place of its own above.
+    logs
+        Titles of the logs that it was gathered from, with which their channels' names begin; empty of a single one.
     """
 
     title: str
@@ -77,3 +80,8 @@ class Study(Drawn):
     geometry: Geometry = field(default_factory=Geometry)
     findings: tuple[str, ...] = ()
     pictures: tuple[tuple[str, bytes], ...] = ()
+    logs: tuple[str, ...] = ()
+
+    def log_of(self, channel: Channel) -> str:
+        """Title of the log that a channel is of; empty when there is one log only."""
+        return next((log for log in self.logs if channel.name.startswith(f"{log}: ")), "")

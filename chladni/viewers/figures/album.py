@@ -1,6 +1,7 @@
 """Figures in sections, each drawn once and rendered once in each format, whoever asks for it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Self
 
 from matplotlib.figure import Figure
@@ -66,9 +67,15 @@ class Album:
         )
 
     @classmethod
-    def over_one_another(cls, studies: Sequence[Study], *, scales: Scales = USUAL) -> Self:
-        """Draw the spectra and transfer functions of several logs, a curve for each."""
-        return cls(overlaid_figures(studies, scales=scales))
+    def over_one_another(cls, whole: Study, studies: Sequence[Study], *, scales: Scales = USUAL) -> Self:
+        """Draw the spectra and transfer functions of several logs, a curve for each, and what else `whole` has."""
+        rest = cls.of(replace(whole, densities=(), response=None), scales=scales)
+        return cls({**rest.sections, **overlaid_figures(studies, scales=scales)})
+
+    @classmethod
+    def of_change(cls, before: Study, after: Study, changes: Mapping[str, Figure]) -> Self:
+        """Draw the spectra of two logs over one another, beside figures of what changed."""
+        return cls({"comparison": changes, **overlaid_figures([before, after])})
 
     @property
     def figures(self) -> dict[str, Figure]:

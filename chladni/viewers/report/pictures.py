@@ -63,7 +63,9 @@ class Pictures:
         return element("div", shown, class_="figures") if shown else ""
 
     def responses(self, album: Album) -> str:
-        """Give each magnitude with its Nyquist plot beside it."""
+        """Give each magnitude with its Nyquist plot beside it; those of several logs, which have none, alone."""
+        if not album.sections.get("nyquist"):
+            return self.figures(album, "responses", _MASKED)
         pairs = zip(album.sections.get("responses", {}), album.sections.get("nyquist", {}), strict=True)
         return "".join(
             element(
@@ -80,6 +82,7 @@ def sections(pictures: Pictures, album: Album) -> dict[str, str]:
         return "".join(pictures.figures(album, section, caption) for section, caption in captioned)
 
     return {
+        "What changed": shown(("comparison", "After over before. Dots: lines that scatter doesn't explain.")),
         "Mode shapes": shown(
             ("mode shapes", "Each mode at its furthest."),
             ("complexity", "Components in the complex plane: a mode that moves in one phase is a line."),

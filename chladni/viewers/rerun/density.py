@@ -11,17 +11,21 @@ from chladni.viewers.groups import Group, groups
 from chladni.viewers.labels import decibel_unit, part_of_several
 from chladni.viewers.rerun.entities import channel_entity, folder
 from chladni.viewers.rerun.lines import draw_band, draw_line
+from chladni.viewers.rerun.several_logs import GroupView, over_one_another
 from chladni.viewers.rerun.timelines import frequency_axis
 from chladni.viewers.style import Style
 
 
 def draw_densities(recording: rr.RecordingStream, study: Study, style: Style) -> list[rrb.View]:
-    """Write the densities in decibels and give a view for each group of channels."""
-    return [
-        _draw_group(recording, study, density, group, style, place)
-        for place, density in enumerate(study.densities, start=1)
-        for group in groups(density.channels)
-    ]
+    """Write the densities in decibels and give a view for each group of channels, which several logs share."""
+    return over_one_another(
+        study,
+        [
+            _draw_group(recording, study, density, group, style, place)
+            for place, density in enumerate(study.densities, start=1)
+            for group in groups(density.channels)
+        ],
+    )
 
 
 def _draw_group(
@@ -31,19 +35,21 @@ def _draw_group(
     group: Group,
     style: Style,
     place: int,
-) -> rrb.View:
+) -> GroupView:
     parent = folder("density", str(place), group.name)
     for row in group.rows:
         _draw_channel(recording, density, row, parent, style, lines_in_view=len(group.rows))
     levels = decibels_of_power(density.values[list(group.rows)])
-    part = part_of_several(place, len(study.densities), f"to {density.frequency_hz[-1]:g} Hz")
-    return rrb.TimeSeriesView(
+    part = part_of_several(place, len(study.densities), f"to {density.frequency_hz[-1]:g} Hz") * (not study.logs)
+    limits = level_limits(levels)
+    view = rrb.TimeSeriesView(
         origin=parent,
         name=f"{group.name} PSD [{decibel_unit(density.units[group.rows[0]])}] · 1 ms = 1 Hz{part}",
         axis_x=frequency_axis(0.0, float(density.frequency_hz[-1])),
-        axis_y=rrb.ScalarAxis(range=level_limits(levels)),
+        axis_y=rrb.ScalarAxis(range=limits),
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
     )
+    return GroupView(group=group, view=view, end=float(density.frequency_hz[-1]), levels=limits)
 
 
 def _draw_channel(

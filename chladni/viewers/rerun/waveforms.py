@@ -10,6 +10,7 @@ from chladni.viewers.drawing import thin, without_repeated_gaps
 from chladni.viewers.groups import Group, groups
 from chladni.viewers.labels import part_of_several, printed_unit, thinned
 from chladni.viewers.rerun.entities import channel_entity, folder
+from chladni.viewers.rerun.several_logs import GroupView, over_one_another
 from chladni.viewers.rerun.timelines import send_scalars, time_axis, time_index
 from chladni.viewers.style import Style
 
@@ -29,11 +30,14 @@ def draw_waveforms(recording: rr.RecordingStream, study: Study, style: Style) ->
     # One budget for the study: twenty short channels weigh as much as one long one.
     channels = sum(len(series.channels) for series in study.series)
     limit = min(ROWS_OF_A_CHANNEL, ROWS_OF_A_STUDY // max(channels, 1))
-    return [
-        _draw_group(recording, study, series, group, style, limit=limit, place=place)
-        for place, series in enumerate(study.series, start=1)
-        for group in groups(series.channels)
-    ]
+    return over_one_another(
+        study,
+        [
+            _draw_group(recording, study, series, group, style, limit=limit, place=place)
+            for place, series in enumerate(study.series, start=1)
+            for group in groups(series.channels)
+        ],
+    )
 
 
 def waveform_view(study: Study, style: Style, name: str) -> rrb.View | None:
@@ -57,11 +61,12 @@ def _draw_group(
     *,
     limit: int,
     place: int,
-) -> rrb.View:
+) -> GroupView:
     parent = folder("waveforms", str(place), group.name)
-    part = part_of_several(place, len(study.series), f"{series.sample_rate_hz:g} Hz")
+    part = part_of_several(place, len(study.series), f"{series.sample_rate_hz:g} Hz") * (not study.logs)
     stretch = max(_draw_channel(recording, series, row, parent, style, limit) for row in group.rows)
-    return _view(series, parent, f"{group.title}{part}{thinned(stretch)}", style, legend=True)
+    view = _view(series, parent, f"{group.title}{part}{thinned(stretch)}", style, legend=True)
+    return GroupView(group=group, view=view, end=series.start_time_ns + series.duration_s * NS_PER_S)
 
 
 def _view(series: TimeSeries, origin: str, name: str, style: Style, *, legend: bool) -> rrb.View:
