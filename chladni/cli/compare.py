@@ -46,7 +46,8 @@ def compare(
     from chladni.apps.compare import compare_logs
     from chladni.apps.documents import comparison_document
 
-    titles = log_names([before, after])
+    twice = before.resolve() == after.resolve()
+    titles = tuple(f"{before.name}, {when}" for when in ("before", "after")) if twice else log_names([before, after])
     out = Output.of_log([before, after, opener.setup], json=json, figures=figures, report=report)
     opening = opener.among([before, after])
     with (

@@ -45,20 +45,16 @@ def envelope(
     shaft: Annotated[
         float | None, typer.Option(metavar="HZ", help="Revolutions a second of its shaft.", show_default=False)
     ] = None,
-    start: options.Start = None,
-    end: options.End = None,
+    part: options.Part,
     opener: Opener,
-    json: options.Json = None,
-    figures: options.Figures = None,
-    report: options.Report = None,
+    targets: options.Targets,
 ) -> None:
     """Envelope spectrum in the most impulsive band, with a bearing's frequencies."""
     from chladni.apps.envelope import envelope_document, measure_envelopes
     from chladni.apps.findings import reading_sentences
-    from chladni.apps.sources import Span
     from chladni.signals.study import Study
 
-    out = Output.of_log([log, opener.setup], json=json, figures=figures, report=report)
+    out = targets.output([log, opener.setup])
     geometry = None if bearing is None else _bearing(bearing)
     with opener(log) as opened, out.progress(log.name) as progress:
         found = measure_envelopes(
@@ -68,7 +64,7 @@ def envelope(
             resolution_hz=resolution,
             bearing=geometry,
             shaft_hz=shaft,
-            span=Span(start_s=start, end_s=end),
+            span=part.span(),
             progress=progress,
         )
         told = reading_sentences(opened, everything=channel is None)
@@ -77,7 +73,8 @@ def envelope(
         _print_faults(out, one)
     out.lines((*told, *found.notes))
     study = Study(title=log.name, envelopes=found.spectra, findings=(*told, *found.notes))
-    out.pictures(study, figures=figures, report=report)
+    out.csv(found.spectra)
+    out.pictures(study, figures=targets.figures, report=targets.report)
     out.json(envelope_document(found))
 
 

@@ -1,15 +1,14 @@
 """``chladni levels``: how strong, how peaked, how severe."""
 
-from pathlib import Path
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from chladni.cli import options
+from chladni.cli import options, words
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
-from chladni.cli.words import number, unit, with_error
+from chladni.cli.words import number, with_error
 
 if TYPE_CHECKING:
     from chladni.signals.levels import Levels, Severity
@@ -39,53 +38,42 @@ def levels(
     slow: Annotated[
         bool, typer.Option("--slow", help="The machine turns slower than 600 r/min: severity from 2 Hz on.")
     ] = False,
-    start: options.Start = None,
-    end: options.End = None,
+    unit: options.Unit = None,
+    part: options.Part,
     opener: Opener,
-    json: options.Json = None,
-    csv: Annotated[
-        Path | None, typer.Option(metavar="FILE.csv", help="Write the levels as a table.", show_default=False)
-    ] = None,
-    figures: options.Figures = None,
-    report: options.Report = None,
+    targets: options.Targets,
 ) -> None:
     """RMS, peak, crest factor, skewness, kurtosis, and vibration severity in mm/s."""
     from chladni.apps.findings import reading_sentences
     from chladni.apps.levels import levels_document, measure_levels
-    from chladni.apps.sources import Span
+    from chladni.signals.shown_units import all_in_units
     from chladni.signals.study import Study
 
-    require_places(
-        reads=[log, opener.setup],
-        writes={"--json": json, "--csv": csv, "--report": report},
-        folders={"--figures": figures},
-    )
-    out = Output(json)
+    out = targets.output([log, opener.setup])
     with opener(log) as opened, out.progress(log.name) as progress:
-        found = measure_levels(
+        measured = measure_levels(
             opened,
             channels=channel,
             bands_hz=None if band is None else [band],
             running_s=running,
             machine=machine,
             slow=slow,
-            span=Span(start_s=start, end_s=end),
+            span=part.span(),
             progress=progress,
         )
         told = reading_sentences(opened, everything=channel is None)
+    found = replace(measured, levels=all_in_units(measured.levels, unit))
     for one in found.levels:
         _print_levels(out, one)
     for judged in found.severities:
         _print_severity(out, judged)
     if found.severities and machine is None:
         out.lines(("no zone of severity is told: it needs the machine's class (--machine)",))
-    out.lines((*told, *found.notes))
-    if csv is not None:
-        from chladni.io.files.levels_table import write_levels_csv
-
-        out.line(f"table: {write_levels_csv(csv, found.levels, found.severities)}")
-    study = Study(title=log.name, levels=found.levels, severities=found.severities, findings=(*told, *found.notes))
-    out.pictures(study, figures=figures, report=report)
+    findings = (*told, *found.notes)
+    out.lines(findings)
+    out.csv([*found.levels, *found.severities])
+    study = Study(title=log.name, levels=found.levels, severities=found.severities, findings=findings)
+    out.pictures(study, figures=targets.figures, report=targets.report)
     out.json(levels_document(found))
 
 
@@ -98,7 +86,7 @@ def _print_levels(out: Output, found: "Levels") -> None:
                 [
                     channel.name,
                     with_error(float(found.rms[row, column]), float(found.rms_std[row, column])),
-                    unit(channel.unit),
+                    words.unit(channel.unit),
                     *(
                         number(float(one[row, column]))
                         for one in (

@@ -39,6 +39,7 @@ from chladni.cli.srs import srs
 from chladni.cli.study import study
 from chladni.cli.tolerance import tolerance
 from chladni.cli.view import view
+from chladni.cli.waterfall import waterfall
 from chladni.cli.zoom import zoom
 from chladni.signals.errors import ChladniError, LogError
 from chladni.signals.visible import visible, visible_lines
@@ -59,6 +60,7 @@ for command in (
     info,
     levels,
     psd,
+    waterfall,
     octaves,
     envelope,
     cepstrum,

@@ -60,19 +60,18 @@ def orders(
     highest: Annotated[
         float | None, typer.Option(metavar="ORDER", help="Highest order of the map.", show_default=False)
     ] = None,
-    start: options.Start = None,
-    end: options.End = None,
+    part: options.Part,
     opener: Opener,
     json: options.Json = None,
+    csv: options.Csv = None,
     figures: options.Figures = None,
 ) -> None:
     """Orders of a rotating machine: amplitude and phase over its speed."""
     from chladni.apps.documents import orders_document
     from chladni.apps.findings import reading_sentences
     from chladni.apps.orders import track_orders
-    from chladni.apps.sources import Span
 
-    out = Output.of_log([log, opener.setup], json=json, figures=figures)
+    out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures)
     shaft, telling = _telling(tacho=tacho, phase=phase, speed=speed, ridge=ridge)
     with opener(log) as opened:
         found = track_orders(
@@ -83,7 +82,7 @@ def orders(
             method=method,
             revolutions=revolutions,
             highest_order=highest,
-            span=Span(start_s=start, end_s=end),
+            span=part.span(),
             telling=telling,
             pulses_a_revolution=pulses,
             threshold=threshold,
@@ -94,6 +93,7 @@ def orders(
     for cuts in found.cuts:
         _print_cuts(out, cuts)
     out.lines((*told, *found.rotation.notes))
+    out.csv(found.cuts)
     if figures is not None:
         from chladni.viewers.figures.orders import order_figures
 

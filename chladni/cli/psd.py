@@ -7,6 +7,7 @@ from chladni.cli.logs import told_apart
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.words import number, unit, with_error
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from chladni.apps.documents import Document
@@ -98,10 +99,11 @@ def _print_peaks(out: Output, found: "UnitPeaks") -> None:
     at_most = f", {MOST_PEAKS} at most" if len(found.peaks) == MOST_PEAKS else ""
     out.channel_table(
         f"Peaks{where}, the highest first{at_most}{judged}",
-        ["strongest in", "frequency [Hz]", "density", "unit"],
+        ["strongest in", "seen in", "frequency [Hz]", "density", "unit"],
         [
             [
-                _names(peak.channels),
+                peak.channels[0],
+                counted(len(peak.channels), "channel"),
                 with_error(peak.frequency_hz, peak.frequency_std_hz),
                 with_error(peak.height, peak.height_std),
                 unit(peak.unit),
@@ -109,8 +111,3 @@ def _print_peaks(out: Output, found: "UnitPeaks") -> None:
             for peak in found.peaks
         ],
     )
-
-
-def _names(channels: tuple[str, ...]) -> str:
-    """Name the strongest and count the others, whose names would fill the table."""
-    return channels[0] if len(channels) == 1 else f"{channels[0]} and {len(channels) - 1} more"

@@ -96,7 +96,7 @@ def _columns(value: Value) -> Iterator[_Column]:
         labels = [tuple(map(str, value.coordinate(one))) for one in others]
         for label, at in zip(product(*labels), _places(value, others), strict=True):
             told = " / ".join(label)
-            title = " ".join(filter(None, (told, name if place or not told else "")))
+            title = " ".join(filter(None, (told, name if place or not told or value.OF_ROW else "")))
             yield _Column(name=title, unit=value.unit_at(name, at), numbers=numbers[(slice(None), *at)])
 
 

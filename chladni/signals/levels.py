@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel, find_channels
@@ -173,7 +174,7 @@ class Severity(Value):
         What isn't as the standard wants it, in sentences.
     """
 
-    AXES: ClassVar = {"velocity_mm_s": ("channels",), "velocity_std_mm_s": ("channels",)}
+    AXES: ClassVar = dict.fromkeys(("velocity_mm_s", "velocity_std_mm_s", "zone"), ("channels",))
     ROWS: ClassVar = "channels"
 
     channels: tuple[Channel, ...]
@@ -190,6 +191,11 @@ class Severity(Value):
         for name in ("velocity_mm_s", "velocity_std_mm_s"):
             require_shape(name, getattr(self, name), (len(self.channels),), "one entry a channel")
         self._freeze()
+
+    @property
+    def zone(self) -> NDArray[np.object_]:
+        """``[channel]`` zones as they stand in a table; empty texts without a class."""
+        return np.array(self.zones or [""] * len(self.channels), dtype=object)
 
     def select(self, names: Sequence[str]) -> Self:
         """Give the severity of the named channels; `EstimateError` naming those there are when one is missing."""

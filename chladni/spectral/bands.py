@@ -149,7 +149,7 @@ def within(
     """
     line_hz = estimate.frequency_hz
     low_hz, high_hz = band_hz or (0.0, np.inf)
-    kept = (line_hz >= low_hz) & (line_hz <= min(high_hz, np.inf if highest_hz is None else highest_hz))
+    kept = (line_hz >= low_hz) & (line_hz <= high_hz) & (line_hz <= (np.inf if highest_hz is None else highest_hz))
     if np.count_nonzero(kept) < 2:
         asked = f"--fmax {highest_hz:g} Hz" if band_hz is None else f"--band {low_hz:g}-{high_hz:g} Hz"
         raise EstimateError(

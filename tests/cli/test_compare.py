@@ -43,7 +43,8 @@ def test_logs_without_a_common_channel_are_refused(run, arm_log, tmp_path):
 def test_figures_are_saved_where_asked_for(run, arm_log, louder_log, tmp_path):
     outcome = run("compare", arm_log, louder_log, "--channel", TOOL, "--figures", tmp_path / "new")
     assert outcome.code == 0, outcome.err
-    names = ["change-of-psd-1-acceleration.png", "change-of-psd-1-acceleration.svg"]
+    drawn = ("change-of-psd-1-acceleration", "psd-acceleration")
+    names = [f"{name}.{kind}" for name in drawn for kind in ("png", "svg")]
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == names
     assert all(name in outcome.out.replace("\n", "") for name in names)
 
