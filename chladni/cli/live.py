@@ -34,7 +34,10 @@ def live(
         ),
     ],
     *,
-    channel: options.Channels = None,
+    channel: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PATH", help="Only this channel, by its whole name; may be repeated.", show_default=False),
+    ] = None,
     reference: Annotated[
         list[str] | None,
         typer.Option(

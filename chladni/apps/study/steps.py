@@ -12,7 +12,7 @@ from chladni.apps.modes_document import modes_document
 from chladni.apps.sources import Span
 from chladni.apps.spectra import Averaging, densities, transfer
 from chladni.io.log import Log
-from chladni.spectral.bands import up_to
+from chladni.spectral.bands import within
 from chladni.spectral.peaks import find_response_peaks
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def densities_document(log: Log, asked: "PsdTable", __: object = None) -> Docume
     averaging = Averaging(resolution_hz=asked.resolution_hz, window=asked.window, overlap=asked.overlap)
     span = Span(start_s=asked.start_s, end_s=asked.end_s)
     found = densities(log, channels=asked.channels, averaging=averaging, span=span)
-    return psd_document(tuple(up_to(one, asked.highest_hz) for one in found))
+    return psd_document(tuple(within(one, highest_hz=asked.highest_hz) for one in found))
 
 
 def responses_document(log: Log, asked: "FrfTable", __: object = None) -> Document:
@@ -44,7 +44,7 @@ def responses_document(log: Log, asked: "FrfTable", __: object = None) -> Docume
         averaging=Averaging(resolution_hz=asked.resolution_hz, window=asked.window, overlap=asked.overlap),
         span=Span(start_s=asked.start_s, end_s=asked.end_s, join=asked.join),
     )
-    found = up_to(found, asked.highest_hz)
+    found = within(found, highest_hz=asked.highest_hz)
     return frf_document(found, find_response_peaks(found))
 
 
