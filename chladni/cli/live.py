@@ -36,7 +36,7 @@ def live(
     *,
     channel: Annotated[
         list[str] | None,
-        typer.Option(metavar="PATH", help="Only this channel, by its whole name; may be repeated.", show_default=False),
+        typer.Option(metavar="PATH", help="Only this channel, named in full; may be repeated.", show_default=False),
     ] = None,
     reference: Annotated[
         list[str] | None,
