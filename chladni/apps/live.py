@@ -23,13 +23,15 @@ from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.live_state import EventKind, LiveEvent, LiveState
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.time_series import NS_PER_S, TimeSeries
-from chladni.spectral.change_watch import ChangeWatch
+from chladni.spectral.change_watch import ChangeWatch, SignalChange
 from chladni.spectral.running import TIME_CONSTANT_S, RunningAverages, running_segmentation
 from chladni.spectral.severity import Machine
 from chladni.spectral.windows import Window
 
 #: How long a source is waited for; a state comes at least as often while samples do.
 POLL_S: Final = 0.02
+#: ... and how long messages are gathered that come one by one.
+GATHER_S: Final = 0.01
 #: How often averages are renewed, and modes looked for.
 AVERAGES_EVERY_S: Final = 0.5
 MODES_EVERY_S: Final = 5.0
@@ -190,6 +192,7 @@ class _Session:
         self._modes_due = _Schedule(options.modes_every_s)
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="modes")
         self._look: Future[_Look] | None = None
+        self._judging: Future[tuple[SignalChange, ...]] | None = None
         self._start_ns: int | None = None
         self._end_ns = 0
         self._told: set[str] = set()
@@ -203,11 +206,30 @@ class _Session:
             got = self._samples.finish() if ending else self._samples.receive(POLL_S)
             blocks = self._take(got)
             ended = got.ended or ending
+            self._judge(ended=ended)
             fresh = self._renew(ended=ended)
             if blocks or self._events or fresh or ended:
                 yield self._state(blocks, fresh=fresh, ended=ended)
             if ended:
                 return
+            if not any(block.duration_s > POLL_S for block in blocks):
+                # Single messages cost as much as some together.
+                time.sleep(GATHER_S)
+
+    def _judge(self, *, ended: bool) -> None:
+        """Compare full windows with what is usual, in the thread: it takes longer than a picture may wait."""
+        if self._judging is not None and (ended or self._judging.done()):
+            for change in self._judging.result():
+                self._tell(change.kind, change.text, change.time_ns)
+            self._judging = None
+        for grid in self._grids.values():
+            if not grid.watch.ready:
+                continue
+            if ended:
+                for change in grid.watch.judge():
+                    self._tell(change.kind, change.text, change.time_ns)
+            elif self._judging is None:
+                self._judging = self._worker.submit(grid.watch.judge)
 
     def close(self) -> None:
         """Let go of the source and of the thread."""
@@ -242,7 +264,7 @@ class _Session:
             grid.averages.leave_out(silent)
         grid.averages.update(block)
         _note_moving(grid, block)
-        for change in grid.watch.update(block):
+        for change in grid.watch.take(block):
             self._tell(change.kind, change.text, change.time_ns)
 
     def _begin(self, block: TimeSeries) -> _Grid:

@@ -1,6 +1,7 @@
 """``chladni live``: a log that is still being written, a server, an instrument."""
 
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from chladni.viewers.rerun.live_targets import Painter, Target
 
 MEGABYTE = 1_000_000
+TURN_S = 1e-3
 
 
 def live(
@@ -101,6 +103,8 @@ def live(
     )
     _require_options(stamp, keep, save, web)
     out, book = Output(json), EventBook()
+    # Samples, pictures and modes take turns at Python's lock: shorter turns, sooner pictures.
+    sys.setswitchinterval(TURN_S)
     with _stopping() as stop:
         states = follow(
             source,

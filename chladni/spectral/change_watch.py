@@ -1,5 +1,6 @@
 """Watches samples as they come: which lines and levels rose or fell beyond their scatter, which sensors died."""
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
@@ -90,9 +91,26 @@ class ChangeWatch:
         self._baseline: PowerSpectralDensity | None = None
         self._before: set[tuple[str, str]] = set()
         self._rests = _Rests(len(self.channels))
+        self._full: deque[tuple[PowerSpectralDensity, int]] = deque()
+
+    @property
+    def ready(self) -> bool:
+        """Whether there are windows to judge."""
+        return bool(self._full)
 
     def update(self, block: TimeSeries) -> tuple[SignalChange, ...]:
         """Take the next block; give what changed."""
+        return (*self.take(block), *self.judge())
+
+    def judge(self) -> tuple[SignalChange, ...]:
+        """Compare the windows that are full; may run in a thread beside `take`."""
+        told: list[SignalChange] = []
+        while self._full:
+            told += self._judged(*self._full.popleft())
+        return tuple(told)
+
+    def take(self, block: TimeSeries) -> tuple[SignalChange, ...]:
+        """Take the next block, without judging; give which sensors died or are alive again."""
         told = self._rests.changes(block)
         self._window.update(block)
         self._seen += block.samples
@@ -104,10 +122,9 @@ class ChangeWatch:
             # Too many gaps for a single segment.
             density = None
         self._window, self._seen = self._new(), 0
-        if density is None or density.provenance.averages < WINDOW_SEGMENTS // 2:
-            return told
-        end_ns = block.start_time_ns + round(block.duration_s * NS_PER_S)
-        return (*told, *self._judged(density, end_ns))
+        if density is not None and density.provenance.averages >= WINDOW_SEGMENTS // 2:
+            self._full.append((density, block.start_time_ns + round(block.duration_s * NS_PER_S)))
+        return told
 
     def begin_anew(self) -> None:
         """Forget the baseline: the present is what is usual."""

@@ -181,6 +181,8 @@ class RunningAverages:
         EstimateError
             Before the first whole segment.
         """
+        # What waits for its batch to fill would be transformed again at each look.
+        self._best.powers[averaging].average_held()
         found = power_spectral_density(self._best.powers[averaging].result(sample_rate_hz=sample_rate_hz))
         if self._living is None:
             return (found,)
@@ -201,12 +203,14 @@ class RunningAverages:
         """
         if self._best.pairs is None:
             raise EstimateError("spectra of pairs of channels aren't averaged; ask for them")
+        self._best.pairs.average_held()
         return self._best.pairs.result(sample_rate_hz=sample_rate_hz)
 
     def recent_spectra(self) -> CrossSpectra:
         """Give the exponential average of the cross-spectra; errors as for `spectra`."""
         if self._best.fading is None:
             raise EstimateError("spectra of pairs of channels aren't averaged exponentially; ask for them")
+        self._best.fading.average_held()
         return self._best.fading.result()
 
     def response(

@@ -2,6 +2,7 @@
 
 import subprocess
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -92,9 +93,13 @@ class Slow(Target):
     def __init__(self) -> None:
         self.drawn: list[LiveState] = []
 
-    def draw(self, state: LiveState) -> None:
-        time.sleep(0.02)
-        self.drawn.append(state)
+    def prepare(self) -> None:
+        pass
+
+    def draw(self, states: Sequence[LiveState]) -> None:
+        for state in states:
+            time.sleep(0.02)
+            self.drawn.append(state)
 
     def close(self) -> None:
         pass
@@ -114,7 +119,7 @@ def test_a_slow_viewer_holds_nothing_up_and_what_it_lacks_is_told() -> None:
 class Closed(Slow):
     """A viewer that somebody closed."""
 
-    def draw(self, state: LiveState) -> None:  # noqa: ARG002  # nothing is drawn
+    def draw(self, states: Sequence[LiveState]) -> None:  # noqa: ARG002  # nothing is drawn
         raise OSError("it was closed")
 
 

@@ -87,6 +87,8 @@ class LiveLog:
         self._ignored: set[int] = set()
         self._tried: dict[int, int] = {}
         self._begun = False
+        # First and last log time of what waits, and its bytes.
+        self._held = (1 << 63, 0, 0)
         self._lost = LostMessages()
         self._lost_told: dict[tuple[str, str], int] = {}
 
@@ -161,6 +163,12 @@ class LiveLog:
                 known.setdefault(id(part), (part, []))[1].append(batch)
             elif batch.channel_id not in self._ignored:
                 self._waiting.setdefault(batch.channel_id, []).append(batch)
+                first, last, size = self._held
+                self._held = (
+                    min(first, int(batch.log_time_ns.min())),
+                    max(last, int(batch.log_time_ns.max())),
+                    size + int(batch.lengths.sum()),
+                )
         for part, some in known.values():
             for number, piece in part.reader.pieces(some):
                 told += self._place(part, number, piece)
@@ -208,10 +216,7 @@ class LiveLog:
         return self._look(ripe, first=False, ended=ended) if ripe else []
 
     def _settled(self) -> bool:
-        held = [batch for some in self._waiting.values() for batch in some]
-        first = min(int(batch.log_time_ns.min()) for batch in held)
-        last = max(int(batch.log_time_ns.max()) for batch in held)
-        size = sum(int(batch.lengths.sum()) for batch in held)
+        first, last, size = self._held
         return last - first >= self._settle_s * NS_PER_S or size > MOST_HELD_BYTES
 
     def _ripe(self, channel: int) -> bool:

@@ -91,12 +91,21 @@ class LiveDrawing:
         self._stretch = 1
         self._planes: dict[str, _Plane] = {}
         self._falls: list[str] = []
+        self._turn = self._pictures = 0
         self._curves_s = self._falls_s = -np.inf
         self._parts: set[str] = set()
         self._tracked: set[int] = set()
 
-    def draw(self, state: LiveState) -> bool:
-        """Write what is new in a state; whether views were added, so that they have to be arranged anew."""
+    def draw(self, state: LiveState, *, curves: bool = True) -> bool:
+        """Write what is new in a state; whether views were added, so that they have to be arranged anew.
+
+        Parameters
+        ----------
+        state
+            What there is.
+        curves
+            Whether averages are drawn; a state with newer ones may be waiting.
+        """
         if self._style is None:
             self._recording.send_recording_name(visible(state.title))
             self._origin_ns = state.start_time_ns
@@ -106,12 +115,15 @@ class LiveDrawing:
             self._log("/events", event.time_s, rr.TextLog(visible(event.text), level=_level(event.kind)))
         for series in state.series:
             self._waveforms(series)
-        if state.fresh and (state.time_s - self._curves_s >= CURVES_EVERY_S or state.ended):
+        if curves and state.fresh and (state.time_s - self._curves_s >= CURVES_EVERY_S or state.ended):
             self._curves_s = state.time_s
             self._curves(state)
-        if state.fresh and (state.time_s - self._falls_s >= WATERFALLS_EVERY_S or state.ended):
+        if state.ended:
+            self._waterfalls(state, 1 << 16)
+        elif curves and state.time_s - self._falls_s >= WATERFALLS_EVERY_S / max(1, self._pictures):
+            # One picture at a time, so that none holds up the waveforms.
             self._falls_s = state.time_s
-            self._waterfalls(state)
+            self._waterfalls(state, 1)
         return len(self._parts) + len(self._grids) + len(self._falls) > before
 
     def arrange(self) -> None:
@@ -260,11 +272,17 @@ class LiveDrawing:
 
     # --- waterfalls ---
 
-    def _waterfalls(self, state: LiveState) -> None:
-        for place, fall in enumerate(state.waterfalls, start=1):
-            for row, channel in enumerate(fall.channels[:MOST_WATERFALLS]):
-                path = folder("waterfall", str(place), str(row))
-                self._waterfall(path, fall, row, channel, state.time_s)
+    def _waterfalls(self, state: LiveState, count: int) -> None:
+        """Draw the next few waterfalls, in turn."""
+        shown = [
+            (folder("waterfall", str(place), str(row)), fall, row)
+            for place, fall in enumerate(state.waterfalls, start=1)
+            for row in range(min(MOST_WATERFALLS, len(fall.channels)))
+        ]
+        self._pictures = len(shown)
+        for path, fall, row in [shown[(self._turn + one) % len(shown)] for one in range(min(count, len(shown)))]:
+            self._waterfall(path, fall, row, fall.channels[row], state.time_s)
+        self._turn += count
 
     def _waterfall(self, path: str, fall: Waterfall, row: int, channel: Channel, time_s: float) -> None:
         levels = decibels_of_power(fall.values[row])
@@ -272,7 +290,8 @@ class LiveDrawing:
         if not known.size or self._style is None:
             return
         high = float(np.percentile(known, 99.9))
-        picture = amplitude_colours((_resized(levels, PICTURE) - (high - SPAN_DB * 0.6)) / (SPAN_DB * 0.6))
+        share = np.nan_to_num(np.clip((levels - high) / (SPAN_DB * 0.6) + 1, 0.0, 1.0))
+        picture = _COLOURS[_resized((255 * share).astype(np.uint8), PICTURE)]
         self._log(f"{path}/picture", time_s, rr.EncodedImage(contents=_jpeg(picture), media_type="image/jpeg"))
         step_s = float(fall.time_s[1] - fall.time_s[0]) if fall.time_s.size > 1 else 1.0
         first_s = float(fall.time_s[0]) - step_s / 2 + (fall.start_time_ns - self._origin_ns) / NS_PER_S
@@ -455,13 +474,16 @@ def _known_runs(curve: Real) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 1]
 
 
-def _resized(levels: Real, size: tuple[int, int]) -> Real:
+_COLOURS: Final = amplitude_colours(np.linspace(0.0, 1.0, 256))
+
+
+def _resized(levels: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
     """Levels ``[time, line]`` as ``[row, column]`` of a picture; peaks stay."""
     shown, _ = block_maximum(levels, axis=1, limit=size[0])
     shown, _ = block_maximum(shown, axis=0, limit=size[1])
     rows = np.arange(size[1]) * shown.shape[0] // size[1]
     columns = np.arange(size[0]) * shown.shape[1] // size[0]
-    return np.asarray(shown[rows[:, np.newaxis], columns], dtype=np.float64)
+    return np.asarray(shown[rows[:, np.newaxis], columns], dtype=np.uint8)
 
 
 def _jpeg(picture: NDArray[Any]) -> bytes:
@@ -482,3 +504,27 @@ def _mode_table(modes: Sequence[TrackedMode]) -> str:
         for one in modes
     ]
     return head + "\n".join(rows)
+
+
+def rehearse() -> None:
+    """Draw a made state into a recording that nobody sees, so that the first one that counts isn't late."""
+    recording = rr.RecordingStream("rehearsal")
+    stream = rr.binary_stream(recording)
+    noise = np.random.default_rng(0).standard_normal((2, 256))
+    series = TimeSeries.from_arrays(noise, sample_rate_hz=256.0, units="m/s^2")
+    density = PowerSpectralDensity.from_arrays(np.arange(9.0), noise[:, :9] ** 2, units="m/s^2", averages=9)
+    fall = Waterfall(
+        time_s=np.arange(4.0),
+        frequency_hz=np.arange(9.0),
+        values=np.ones((1, 4, 9)),
+        channels=series.channels[:1],
+        start_time_ns=0,
+        bandwidth_hz=1.5,
+        provenance=density.provenance,
+    )
+    drawing = LiveDrawing(recording, following=False)
+    state = LiveState(title="", series=(series,), fresh=True, densities=(density,), waterfalls=(fall,), ended=True)
+    drawing.draw(state)
+    drawing.arrange()
+    stream.read()
+    recording.disconnect()

@@ -5,6 +5,8 @@ import queue
 import threading
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, TYPE_CHECKING, Final, Self
@@ -16,7 +18,7 @@ import rerun as rr
 from chladni.signals.errors import LogError
 from chladni.signals.live_state import LiveState
 from chladni.viewers.rerun.drawing import APPLICATION
-from chladni.viewers.rerun.live import LiveDrawing
+from chladni.viewers.rerun.live import LiveDrawing, rehearse
 from chladni.viewers.rerun.process import LOOPBACK, free_port, start, stop
 
 if TYPE_CHECKING:
@@ -50,8 +52,12 @@ class Target(ABC):
     patience_s: float = 0.0
 
     @abstractmethod
-    def draw(self, state: LiveState) -> None:
-        """Draw a state, and send it on."""
+    def prepare(self) -> None:
+        """Do what takes long the first time."""
+
+    @abstractmethod
+    def draw(self, states: Sequence[LiveState]) -> None:
+        """Draw the states that wait, and send them on."""
 
     @abstractmethod
     def close(self) -> None:
@@ -91,14 +97,20 @@ class RecordingFile(Target):
         self._drawing = LiveDrawing(self._recording, following=False)
         self._drawn = False
 
-    def draw(self, state: LiveState) -> None:
-        """Draw a state; OSError when the disk is full."""
+    def prepare(self) -> None:
+        """Draw something that nobody sees: what is imported for it takes seconds."""
+        rehearse()
+        self._recording.flush(timeout_sec=LAST_S)
+
+    def draw(self, states: Sequence[LiveState]) -> None:
+        """Draw states; OSError when the disk is full."""
         self._drawn = True
-        self._drawing.draw(state)
+        for state in states:
+            self._drawing.draw(state, curves=state is states[-1])
         self._recording.flush(timeout_sec=LAST_S)
         self._way.require_sound()
         if self._most is not None and self._way.written > self._most:
-            self._turn(state)
+            self._turn(states[-1])
 
     def _turn(self, state: LiveState) -> None:
         """Go on in a new file, which holds all averages again; the one before the present goes."""
@@ -106,7 +118,7 @@ class RecordingFile(Target):
         self.earlier.unlink(missing_ok=True)
         self.path.replace(self.earlier)
         self._begin()
-        self.draw(state)
+        self.draw([state])
 
     def _finish(self) -> None:
         # The blueprint goes last: rerun 0.41 has lost rows that followed one in a file (rerun issue 12769).
@@ -224,16 +236,21 @@ class Viewer(Target):
         self._recording.connect_grpc(f"rerun+http://{LOOPBACK}:{data_port}/proxy")
         self._drawing = LiveDrawing(self._recording, following=True)
 
+    def prepare(self) -> None:
+        """Draw something that nobody sees: what is imported for it takes seconds."""
+        rehearse()
+
     @property
     def open(self) -> bool:
         """Whether the viewer still runs."""
         return self._process.poll() is None
 
-    def draw(self, state: LiveState) -> None:
-        """Draw a state; OSError when the viewer was closed."""
+    def draw(self, states: Sequence[LiveState]) -> None:
+        """Draw states; OSError when the viewer was closed."""
         if not self.open:
             raise OSError("it was closed")
-        if self._drawing.draw(state):
+        grown = [self._drawing.draw(state, curves=state is states[-1]) for state in states]
+        if any(grown):
             self._drawing.arrange()
         # Waits for the viewer, or the queue between would grow without end.
         self._recording.flush(timeout_sec=PATIENCE_S)
@@ -311,13 +328,26 @@ class Painter:
         self.close()
 
     def _run(self) -> None:
-        while (state := self._states.get()) is not None:
-            if self._failed.is_set():
-                continue
-            try:
-                self.target.draw(state)
-            except Exception as error:  # noqa: BLE001  # whatever a viewer or a disk does, the averages go on
-                self._fail(error)
+        more = self._draw(self.target.prepare)
+        while more:
+            states = [self._states.get()]
+            with suppress(queue.Empty):
+                while states[-1] is not None:
+                    states.append(self._states.get_nowait())
+            more = states[-1] is not None
+            waiting = [state for state in states if state is not None]
+            if waiting and not self._failed.is_set():
+                self._draw(lambda some=waiting: self.target.draw(some))
+        self._end()
+
+    def _draw(self, work: Callable[[], None]) -> bool:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001  # whatever a viewer or a disk does, the averages go on
+            self._fail(error)
+        return True
+
+    def _end(self) -> None:
         try:
             self.target.close()
         except Exception as error:  # noqa: BLE001  # as above

@@ -1,0 +1,256 @@
+"""Live: what it costs, how late it is, whether its memory grows, and whether anything is lost in silence.
+
+    python benchmarks/bench_live.py equal            # averages beside those of the finished file, all sources
+    python benchmarks/bench_live.py latency          # 12 channels x 5 kHz: from a message's arrival to rerun's stream
+    python benchmarks/bench_live.py load             # 64 channels x 25.6 kHz on two cores
+    python benchmarks/bench_live.py day --hours 24   # 12 channels x 1 kHz fed fast: resident memory
+    python benchmarks/bench_live.py faults --runs 100 --seed 1
+
+Each prints a table, and ends with exit code 1 where a number misses what is asked of it.
+"""
+
+import argparse
+import os
+import resource
+import struct
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chladni.apps.live import live
+from chladni.cli.live import TURN_S
+from chladni.io.live.reception import MessageSource, Reception, Samples
+from chladni.signals.channel import Channel
+from chladni.signals.geometry import Geometry
+from chladni.signals.live_state import LiveState
+from chladni.signals.time_series import TimeSeries
+from chladni.viewers.rerun.live_targets import Painter, RecordingFile
+
+START_NS = 1_700_000_000_000_000_000
+CLOSE = 1e-12
+
+
+class Generator:
+    """Blocks of samples made as they are asked for: an instrument that never waits."""
+
+    name = "made"
+    geometry = Geometry()
+    silent_channels: tuple[str, ...] = ()
+
+    def __init__(self, channels: int, rate_hz: float, seconds: float, *, block_s: float, realtime: bool) -> None:
+        self.channels = tuple(Channel(name=f"/a{n}.x", unit="m/s^2") for n in range(channels))
+        self.rate, self.block = rate_hz, round(block_s * rate_hz)
+        self.blocks = round(seconds * rate_hz / self.block)
+        self.noise = np.random.default_rng(0).standard_normal((channels, 16 * self.block)).astype(np.float32)
+        self.realtime, self.number = realtime, 0
+        self.begun_s = time.monotonic()
+        self.late_s = 0.0
+
+    def rate_hz(self, _channels: Any, *, fitted: bool = True) -> float | None:  # noqa: ARG002
+        """The rate is exact."""
+        return None
+
+    def receive(self, timeout_s: float) -> Samples:
+        """Give the next block, when it is due."""
+        if self.number >= self.blocks:
+            return Samples(ended=True)
+        due_s = self.begun_s + (self.number + 1) * self.block / self.rate
+        if self.realtime:
+            wait_s = due_s - time.monotonic()
+            if wait_s > timeout_s:
+                time.sleep(timeout_s)
+                return Samples()
+            time.sleep(max(0.0, wait_s))
+            self.late_s = max(self.late_s, -wait_s)
+        first = self.number % 16 * self.block
+        series = TimeSeries(
+            values=self.noise[:, first : first + self.block],
+            sample_rate_hz=self.rate,
+            channels=self.channels,
+            start_time_ns=START_NS + round(self.number * self.block / self.rate * 1e9),
+        )
+        self.number += 1
+        return Samples(blocks=(series,))
+
+    def finish(self) -> Samples:
+        """Nothing is held."""
+        return Samples(ended=True)
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def resident_mb() -> float:
+    """Memory of this process at present."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def day(options: argparse.Namespace) -> bool:
+    """Feed a day of 12 channels x 1 kHz as fast as it goes, with a recording, and watch the memory."""
+    source = Generator(12, 1000.0, options.hours * 3600, block_s=1.0, realtime=False)
+    begun_s, marks, next_s = time.monotonic(), [], 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        painter = Painter(RecordingFile(Path(folder) / "day.rrd", keep_bytes=100_000_000))
+        for state in live(source):
+            for told in (*(one.text for one in state.events), *painter.show(state)):
+                print(f"  {state.time_s:9.0f} s: {told}")
+            if time.monotonic() - begun_s >= next_s:
+                next_s += 10.0
+                marks.append((time.monotonic() - begun_s, state.time_s, resident_mb()))
+                wall_s, fed_s, size_mb = marks[-1]
+                print(f"  {wall_s:6.0f} s: {fed_s / 3600:6.2f} h fed, {size_mb:7.1f} MB", flush=True)
+        print(*painter.close(), sep="\n")
+        kept_mb = sum(path.stat().st_size for path in Path(folder).iterdir()) / 1e6
+    after = [size for wall_s, _, size in marks if wall_s > 60]
+    spread = (max(after) / after[0] - 1) if after else float("nan")
+    print(f"| fed | wall | memory after a minute | most after it | growth | recording |\n|{'---|' * 6}")
+    print(
+        f"| {state.time_s / 3600:.1f} h | {time.monotonic() - begun_s:.0f} s | {after[0]:.0f} MB "
+        f"| {max(after):.0f} MB | {100 * spread:.1f} % (asked: 5) | {kept_mb:.0f} MB (asked: 100) |"
+    )
+    return spread <= 0.05
+
+
+def load(options: argparse.Namespace) -> bool:
+    """Feed 64 channels x 25.6 kHz in real time, and see whether it follows."""
+    source = Generator(64, 25_600.0, options.seconds, block_s=0.02, realtime=True)
+    before = resource.getrusage(resource.RUSAGE_SELF)
+    begun_s = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        painter = Painter(RecordingFile(Path(folder) / "load.rrd", keep_bytes=1_000_000_000))
+        told = [text for state in live(source, references=["/a0.x"]) for text in painter.show(state)]
+        fed_s = time.monotonic() - begun_s
+        told += painter.close()
+    after = resource.getrusage(resource.RUSAGE_SELF)
+    used_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    behind_s = fed_s - options.seconds
+    print(f"| fed | wall | processor | most behind | told |\n|{'---|' * 5}")
+    print(
+        f"| {options.seconds:.0f} s | {fed_s:.1f} s | {used_s / fed_s:.2f} cores | {source.late_s:.2f} s | "
+        f"{'; '.join(told) or 'nothing'} |"
+    )
+    return behind_s < 2.0 and not told
+
+
+class Arrivals(MessageSource):
+    """JSON-free messages of 12 numbers at 5 kHz, each with the moment at which it arrived."""
+
+    def __init__(self, seconds: float) -> None:
+        from chladni.io.mcap.channel_registry import McapChannel, McapSchema
+
+        self.name = "made"
+        text = b"std_msgs/Header header\nfloat64[12] values\n" + _HEADER
+        schema = McapSchema(id=1, name="test/msg/Twelve", encoding="ros2msg", data=text)
+        self._channels = {1: McapChannel(id=1, topic="/a", message_encoding="cdr", metadata={}, schema=schema)}
+        self._lock, self._held = threading.Lock(), list[tuple[bytes, int]]()
+        self.arrived: list[float] = []
+        self._count = round(seconds * 5000)
+        self._done = threading.Event()
+        threading.Thread(target=self._make, daemon=True).start()
+
+    def _make(self) -> None:
+        rng = np.random.default_rng(0)
+        begun_s = time.monotonic()
+        for number in range(self._count):
+            wait_s = begun_s + number / 5000 - time.monotonic()
+            if wait_s > 1e-3:
+                time.sleep(wait_s)
+            at_ns = START_NS + number * 200_000
+            head = struct.pack("<4sIII4s", b"\0\1\0\0", at_ns // 10**9, at_ns % 10**9, 1, b"\0\0\0\0")
+            payload = head + rng.standard_normal(12).astype("<f8").tobytes()
+            with self._lock:
+                self._held.append((payload, at_ns))
+                self.arrived.append(time.monotonic())
+        self._done.set()
+
+    @property
+    def channels(self) -> Any:
+        """The one channel of messages."""
+        return self._channels
+
+    def receive(self, timeout_s: float) -> Reception:
+        """Give what has come."""
+        from chladni.io.live.held_messages import joined_messages
+
+        end_s = time.monotonic() + timeout_s
+        while not self._held and time.monotonic() < end_s and not self._done.is_set():
+            time.sleep(0.002)
+        with self._lock:
+            held, self._held = self._held, []
+        if not held:
+            return Reception(ended=self._done.is_set())
+        return Reception(batches=(joined_messages(1, [one for one, _ in held], [at for _, at in held], sequence=0),))
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+_HEADER = (
+    b"================================================================================\n"
+    b"MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+    b"================================================================================\n"
+    b"MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+)
+
+
+class Watched(RecordingFile):
+    """A recording that notes when the samples of each state were in rerun's stream."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.seen: list[tuple[int, int, float]] = []
+
+    def draw(self, states: Sequence[LiveState]) -> None:
+        """Draw, and note when it was done."""
+        super().draw(states)
+        now_s = time.monotonic()
+        for series in [one for state in states for one in state.series]:
+            first = round((series.start_time_ns - START_NS) / 200_000)
+            self.seen.append((first, first + series.samples, now_s))
+
+
+def latency(options: argparse.Namespace) -> bool:
+    """From the arrival of a message to the moment at which rerun's bytes of it are written."""
+    source = Arrivals(options.seconds)
+    with tempfile.TemporaryDirectory() as folder:
+        target = Watched(Path(folder) / "a.rrd")
+        painter = Painter(target)
+        told = [text for state in live(source) for text in painter.show(state)]
+        told += painter.close()
+    late = np.full(len(source.arrived), np.nan)
+    for first, last, at_s in target.seen:
+        late[first:last] = at_s - np.array(source.arrived[first:last])
+    # The beginning is held until channels and clocks are known.
+    settled = late[(4 * 5000) :]
+    median, most = np.nanmedian(settled), np.nanpercentile(settled, 99)
+    print(f"| messages | drawn | median | 99 % | largest | told |\n|{'---|' * 6}")
+    print(
+        f"| {late.size} | {np.isfinite(late).sum()} | {1e3 * median:.0f} ms (asked: 50) | {1e3 * most:.0f} ms "
+        f"(asked: 200) | {1e3 * np.nanmax(settled):.0f} ms | {'; '.join(told) or 'nothing'} |"
+    )
+    return bool(median <= 0.05 and most <= 0.2 and np.isfinite(late).all())
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=["equal", "latency", "load", "day", "faults"])
+    parser.add_argument("--hours", type=float, default=24.0)
+    parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--runs", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    # As the command does.
+    sys.setswitchinterval(TURN_S)
+    ways: dict[str, Callable[[argparse.Namespace], bool]] = {"latency": latency, "load": load, "day": day}
+    return 0 if ways[options.what](options) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
