@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from chladni.apps.excitation import FORCE_UNITS, excitations
 from chladni.apps.modal_channels import motions_of_one_unit
 from chladni.apps.modes import Band, Wanted, modes_of_spectra
 from chladni.io.live.door import LiveSamples, open_live
+from chladni.io.live.instrument import Instrument
 from chladni.io.live.reception import MessageSource, Samples
 from chladni.io.setup import Setup
 from chladni.io.stamps import StampRequest
@@ -28,6 +29,10 @@ from chladni.spectral.running import TIME_CONSTANT_S, RunningAverages, running_s
 from chladni.spectral.severity import Machine
 from chladni.spectral.windows import Window
 
+if TYPE_CHECKING:
+    from chladni.robots.robot import Robot
+    from chladni.robots.torque_residual import TorqueResidual
+
 #: How long a source is waited for; a state comes at least as often while samples do.
 POLL_S: Final = 0.02
 #: ... and how long messages are gathered that come one by one.
@@ -35,8 +40,8 @@ GATHER_S: Final = 0.01
 #: How often averages are renewed, and modes looked for.
 AVERAGES_EVERY_S: Final = 0.5
 MODES_EVERY_S: Final = 5.0
-#: Work that renews averages takes at most this share of a core's time.
-SHARE: Final = 0.25
+#: Work of each kind that renews averages takes at most this share of the time.
+SHARE: Final = 0.1
 #: More channels than these, and modes of the present are looked for in the average over all.
 MOST_FADING: Final = 32
 #: Time constant of the averages from which modes of the present are taken.
@@ -44,7 +49,7 @@ RECENT_S: Final = 20.0
 
 
 def live(
-    source: "str | Path | MessageSource | LiveSamples",
+    source: "str | Path | MessageSource | Instrument | LiveSamples",
     *,
     channels: Names | None = None,
     references: Names | None = None,
@@ -55,6 +60,7 @@ def live(
     time_constant_s: float = TIME_CONSTANT_S,
     modes_every_s: float = MODES_EVERY_S,
     machine: Machine | None = None,
+    robot: "Robot | Path | str | None" = None,
     setup: Setup | Path | str | None = None,
     stamp: StampRequest = "auto",
     sample_rate_hz: float | None = None,
@@ -82,6 +88,8 @@ def live(
         How often modes are looked for in the responses alone; 0 for never.
     machine
         Class and foundation, for the zone of severity.
+    robot
+        Robot file or description: the torque that it doesn't explain is averaged as ``torque_residual.JOINT``.
     setup, stamp, sample_rate_hz
         As for `chladni.open_log`.
     patience_s
@@ -116,8 +124,9 @@ def live(
         time_constant_s=time_constant_s,
         modes_every_s=modes_every_s,
         machine=machine,
+        robot=_robot(robot),
     )
-    if isinstance(source, str | Path | MessageSource):
+    if isinstance(source, str | Path | MessageSource | Instrument):
         samples = open_live(
             source,
             channels=None if channels is None else as_names(channels),
@@ -145,6 +154,7 @@ class _Options:
     time_constant_s: float
     modes_every_s: float
     machine: Machine | None
+    robot: "Robot | None"
 
     def __post_init__(self) -> None:
         if not 0 < self.time_constant_s < float("inf"):
@@ -189,6 +199,9 @@ class _Session:
         self._tracker = ModeTracker()
         self._spectra_due = _Schedule(AVERAGES_EVERY_S)
         self._pairs_due = _Schedule(2 * AVERAGES_EVERY_S)
+        self._levels_due = _Schedule(2 * AVERAGES_EVERY_S)
+        self._torques: dict[tuple[Channel, ...], TorqueResidual | None] = {}
+        self._pairs: dict[tuple[Channel, ...], CrossSpectra] = {}
         self._modes_due = _Schedule(options.modes_every_s)
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="modes")
         self._look: Future[_Look] | None = None
@@ -242,7 +255,8 @@ class _Session:
         taken = []
         for told in got.told:
             self._tell(told.kind, told.text, told.time_ns, told.samples)
-        for block in got.blocks:
+        residuals = [one for one in map(self._residual, got.blocks) if one is not None]
+        for block in (*got.blocks, *residuals):
             if self._start_ns is None:
                 self._start_ns = block.start_time_ns
             try:
@@ -267,10 +281,30 @@ class _Session:
         for change in grid.watch.take(block):
             self._tell(change.kind, change.text, change.time_ns)
 
+    def _residual(self, block: TimeSeries) -> TimeSeries | None:
+        """Torque that the robot's description doesn't explain; None for blocks that don't hold its joints."""
+        if self._options.robot is None:
+            return None
+        if block.channels not in self._torques:
+            from chladni.robots.torque_residual import TorqueResidual
+
+            try:
+                made = TorqueResidual.of(self._options.robot, self._samples.number_lists, block)
+            except SetupError as error:
+                made = None
+                self._once(str(error))
+            self._torques[block.channels] = made
+        torque = self._torques[block.channels]
+        return None if torque is None else torque.take(block)
+
     def _begin(self, block: TimeSeries) -> _Grid:
         options = self._options
         plan = running_segmentation(
-            block.sample_rate_hz, resolution_hz=options.resolution_hz, window=options.window, overlap=options.overlap
+            block.sample_rate_hz,
+            channels=len(block.channels),
+            resolution_hz=options.resolution_hz,
+            window=options.window,
+            overlap=options.overlap,
         )
         pairs = len(block.channels) > 1 or options.modes_every_s > 0
         fading = pairs and options.modes_every_s > 0 and len(block.channels) <= MOST_FADING
@@ -309,6 +343,8 @@ class _Session:
         fresh = False
         if self._grids and (ended or self._spectra_due.due):
             fresh = self._timed(self._spectra_due, lambda: self._renew_spectra(ended))
+        if self._grids and (ended or self._levels_due.due):
+            self._timed(self._levels_due, lambda: self._renew_levels(ended))
         if self._grids and (ended or self._pairs_due.due):
             self._timed(self._pairs_due, lambda: self._renew_response(ended))
         if self._grids and self._options.modes_every_s > 0:
@@ -322,9 +358,7 @@ class _Session:
         return done
 
     def _renew_spectra(self, ended: bool) -> bool:
-        found: dict[str, list[Any]] = {
-            name: [] for name in ("densities", "exponential", "peak_hold", "waterfalls", "levels", "severities")
-        }
+        found: dict[str, list[Any]] = {name: [] for name in ("densities", "exponential", "peak_hold", "waterfalls")}
         for channels, grid in self._grids.items():
             rate_hz = self._samples.rate_hz(channels, fitted=ended)
             averages = grid.averages
@@ -336,6 +370,13 @@ class _Session:
             except EstimateError as error:
                 if ended:
                     self._once(str(error))
+        self._values |= {name: tuple(some) for name, some in found.items()}
+        return True
+
+    def _renew_levels(self, ended: bool) -> bool:
+        found: dict[str, list[Any]] = {"levels": [], "severities": []}
+        for grid in self._grids.values():
+            averages = grid.averages
             try:
                 found["levels"].append(averages.levels())
                 severity = averages.severity()
@@ -349,12 +390,14 @@ class _Session:
     def _renew_response(self, ended: bool) -> bool:
         for channels, grid in self._grids.items():
             names = self._references(channels, grid)
-            if not names or len(names) == len(channels):
+            looked_at = self._options.modes_every_s > 0 and (ended or self._modes_due.due)
+            if not looked_at and (not names or len(names) == len(channels)):
                 continue
             try:
                 spectra = grid.averages.spectra(sample_rate_hz=self._samples.rate_hz(channels, fitted=ended))
+                self._pairs[channels] = spectra
                 held = {channel.name for channel in spectra.channels}
-                if set(names) <= held and len(held) > len(names):
+                if names and set(names) <= held and len(held) > len(names):
                     response, coherent = grid.averages.response(names, spectra=spectra)
                     self._values |= {"response": response, "coherence": coherent}
             except EstimateError as error:
@@ -399,7 +442,9 @@ class _Session:
         for note in notes:
             self._once(note)
         try:
-            whole = grid.averages.spectra(sample_rate_hz=self._samples.rate_hz(channels, fitted=ended)).select(names)
+            if (spectra := self._pairs.pop(channels, None)) is None:
+                return None
+            whole = spectra.select(names)
             recent = whole if len(channels) > MOST_FADING else grid.averages.recent_spectra().select(names)
         except EstimateError as error:
             if ended:
@@ -490,3 +535,12 @@ def _note_moving(grid: _Grid, block: TimeSeries) -> None:
         known = row[row == row]  # NaN is missing
         if known.size and (known.min() < known.max() or grid.first.setdefault(channel.name, known[0]) != known[0]):
             grid.moved.add(channel.name)
+
+
+def _robot(given: "Robot | Path | str | None") -> "Robot | None":
+    if not isinstance(given, str | Path):
+        return given
+    # MuJoCo takes a moment to load.
+    from chladni.robots.loading import load_robot
+
+    return load_robot(given)

@@ -63,6 +63,12 @@ def live(
         MachineName | None,
         typer.Option(help="Class and foundation, for the zone of ISO 20816-3.", show_default=False),
     ] = None,
+    robot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Robot file, URDF or MJCF: the torque that it doesn't explain.", show_default=False
+        ),
+    ] = None,
     setup: Annotated[
         Path | None,
         typer.Option(
@@ -97,7 +103,8 @@ def live(
     from chladni.apps.live import live as follow
     from chladni.apps.live_document import EventBook, live_document
 
-    reads = [setup] if source == "-" or "://" in source or source.startswith("audio:") else [Path(source), setup]
+    is_file = source != "-" and "://" not in source and not source.startswith("audio:")
+    reads = [Path(source) if is_file else None, setup, robot]
     require_places(
         reads=reads, writes={"--json": json, "--save": save, "--report": report}, folders={"--figures": figures}
     )
@@ -117,6 +124,7 @@ def live(
             time_constant_s=time_constant,
             modes_every_s=modes_every,
             machine=machine,
+            robot=robot,
             setup=setup,
             stamp=stamp,  # type: ignore[arg-type]  # checked above
             sample_rate_hz=rate,

@@ -93,7 +93,12 @@ class JointTopic:
 
 def joint_topics(robot: Robot, log: Log) -> tuple[JointTopic, ...]:
     """Find the topics that name joints of the robot, or whose elements the robot file names."""
-    found = (_joint_topic(robot, lists) for lists in log.number_lists)
+    return topics_of_joints(robot, log.number_lists)
+
+
+def topics_of_joints(robot: Robot, held: Sequence[NumberLists]) -> tuple[JointTopic, ...]:
+    """Find those of the lists that name joints of the robot, or whose elements its file names."""
+    found = (_joint_topic(robot, lists) for lists in held)
     return tuple(one for one in found if one is not None and one.lists.place in (_SET | _MEASURED))
 
 

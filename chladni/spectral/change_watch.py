@@ -281,7 +281,9 @@ class _Rests:
 def _longest_rest_s(block: TimeSeries, moving: Mask) -> Real:
     """Longest time that a channel that moves kept one value within a block."""
     longest = np.zeros(len(block.channels))
-    for row in np.flatnonzero(moving):
+    # Noise never rests; only what shows one value twice is looked at.
+    resting = (block.values[:, 1:] == block.values[:, :-1]).any(axis=1)
+    for row in np.flatnonzero(moving & resting):
         edges = np.flatnonzero(np.diff(block.values[row]) != 0)
         longest[row] = float(np.diff(edges, prepend=-1, append=block.samples - 1).max()) / block.sample_rate_hz
     return longest

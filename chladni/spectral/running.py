@@ -27,6 +27,8 @@ from chladni.spectral.windows import Window
 
 #: Length of a segment that one doesn't wait for, unless a resolution is asked for.
 DEFAULT_SEGMENT_S: Final = 2.0
+#: Memory of the pairs of channels of a default segment.
+PAIRS_BYTES: Final = 1 << 27
 #: Powers that a running waterfall holds, at most, and slices at least.
 WATERFALL_VALUES: Final = 1 << 22
 FEWEST_SLICES: Final = 16
@@ -39,6 +41,7 @@ TIME_CONSTANT_S: Final = 10.0
 def running_segmentation(
     sample_rate_hz: float,
     *,
+    channels: int = 1,
     resolution_hz: float | None = None,
     window: Window = "hann",
     overlap: float = 0.5,
@@ -49,18 +52,22 @@ def running_segmentation(
     ----------
     sample_rate_hz
         Samples a second.
+    channels
+        How many there are: of many, a longer segment makes more pairs of spectra than a processor's cache holds.
     resolution_hz
-        Spacing of the lines; None takes a power of two of 2 s and 8192 samples at most.
+        Spacing of the lines; None takes a power of two of 2 s and 8192 samples at most, of 2048 for 64 channels.
     window, overlap
         As for `cross_spectra`.
 
     Examples
     --------
-    >>> running_segmentation(1000.0).samples, running_segmentation(25600.0).samples
-    (1024, 8192)
+    >>> [running_segmentation(rate_hz, channels=64).samples for rate_hz in (1000.0, 25600.0)]
+    [1024, 2048]
     """
     if resolution_hz is None:
         most = min(LONGEST_DEFAULT_SEGMENT, max(16, int(DEFAULT_SEGMENT_S * sample_rate_hz)))
+        # Real and imaginary parts of all pairs of channels, on each line.
+        most = min(most, max(256, PAIRS_BYTES // (2 * channels) ** 2 // 4))
         resolution_hz = sample_rate_hz / 2 ** floor(log2(most))
     return plan_segmentation(
         sample_rate_hz, samples_available=None, resolution_hz=resolution_hz, window=window, overlap=overlap

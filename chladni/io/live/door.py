@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from chladni.io.live.reception import MessageSource, Samples
 from chladni.io.setup import Setup, load_setup
@@ -10,6 +10,10 @@ from chladni.io.stamps import StampRequest
 from chladni.signals.channel import Channel
 from chladni.signals.errors import SetupError
 from chladni.signals.geometry import Geometry
+
+if TYPE_CHECKING:
+    from chladni.io.live.instrument import Instrument
+    from chladni.io.number_lists import NumberLists
 
 STANDARD_INPUT = "-"
 SERVER_SCHEMES = ("ws://", "wss://")
@@ -21,6 +25,7 @@ class LiveSamples(Protocol):
     """Blocks of samples as they come, of a source of messages or of an instrument."""
 
     name: str
+    number_lists: "tuple[NumberLists, ...]"
 
     @property
     def geometry(self) -> Geometry:
@@ -44,7 +49,7 @@ class LiveSamples(Protocol):
 
 
 def open_live(
-    source: "str | Path | MessageSource",
+    source: "str | Path | MessageSource | Instrument",
     *,
     channels: Sequence[str] | None = None,
     setup: Setup | Path | str | None = None,
@@ -58,7 +63,7 @@ def open_live(
     ----------
     source
         Path of an MCAP log that a recorder is still writing; ``-``, MCAP on standard input; ``ws://HOST:PORT``, a
-        Foxglove WebSocket server.
+        Foxglove WebSocket server; ``audio:`` or ``audio:DEVICE``, a sound card. Or what gives messages or samples.
     channels
         Message paths; None for every channel whose samples are uniform.
     setup
@@ -75,9 +80,16 @@ def open_live(
     SetupError
         When the setup file has mistakes.
     """
+    from chladni.io.live.instrument import Instrument, LiveInstrument
     from chladni.io.live.live_log import LiveLog
 
     known = load_setup(setup) if isinstance(setup, Path | str) else setup or Setup()
+    if isinstance(source, str) and source.startswith(AUDIO_SCHEME):
+        from chladni.io.live.audio import AudioDevice
+
+        source = AudioDevice(source.removeprefix(AUDIO_SCHEME), sample_rate_hz=sample_rate_hz)
+    if isinstance(source, Instrument):
+        return LiveInstrument(source, channels=channels, setup=known, patience_s=patience_s)
     messages = source if isinstance(source, MessageSource) else _messages(str(source), patience_s)
     return LiveLog(messages, channels=channels, setup=known, stamp=stamp, sample_rate_hz=sample_rate_hz)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from chladni.signals.errors import LogError
 from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.wording import counted
+
+if TYPE_CHECKING:
+    from chladni.io.number_lists import NumberLists
 
 #: The beginning that is held until channels and clocks are known.
 SETTLE_S: Final = 2.0
@@ -86,6 +89,8 @@ class LiveLog:
         self._given_up: set[str] = set()
         self._ignored: set[int] = set()
         self._tried: dict[int, int] = {}
+        #: Lists of numbers in messages, an element for each joint or motor, of the topics known so far.
+        self.number_lists: tuple[NumberLists, ...] = ()
         self._begun = False
         # First and last log time of what waits, and its bytes.
         self._held = (1 << 63, 0, 0)
@@ -236,6 +241,7 @@ class LiveLog:
         )
         catalog = read_catalog(held, setup=self._fitting_setup(channels.values()), request=self._stamp)
         sources = self._sources(catalog)
+        self.number_lists = (*self.number_lists, *catalog.number_lists)
         told = [
             Told(kind="topic", text=f"{one.topic} can't be read: {one.reason}")
             for one in catalog.unread

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.clock.grid_index import NOWHERE
+from chladni.io.clock.stamp_order import ClockSteps
 from chladni.io.live.reception import Told
 from chladni.io.live.running_rate import RunningRate
 from chladni.io.placement import Placement, StatedRate, place_stream
@@ -256,7 +257,12 @@ class StreamPlaces:
         known = self._behind_ns.size
         time_ns = np.concatenate((self._behind_ns, part.stamps_ns + self._shift_ns))
         sizes = None if part.counts is None else np.concatenate((self._behind_sizes, part.counts))
-        index, taken = self._fitted(time_ns, sizes)
+        index, taken, clock = self._fitted(time_ns, sizes)
+        if clock.count:
+            # A step too small to be judged by itself, such as messages that are sent again.
+            self._tell_steps(clock)
+            time_ns = clock.run_on(time_ns)
+            self._shift_ns += int(clock.shift_ns[-1])
         there = index[:known] > NOWHERE // 2
         if index.size and there.any():
             index = np.where(
@@ -269,7 +275,14 @@ class StreamPlaces:
             index = np.full(time_ns.size, NOWHERE)
         return part.stamps_ns.size, self._spread(part, time_ns[known:], index[known:], taken[known:])
 
-    def _fitted(self, time_ns: Whole, sizes: Whole | None) -> tuple[Whole, Whole]:
+    def _tell_steps(self, clock: ClockSteps) -> None:
+        for before_ns, after_ns in zip(clock.before_ns.tolist(), clock.after_ns.tolist(), strict=True):
+            way = "ahead" if after_ns > before_ns else "back"
+            size_s = abs(after_ns - before_ns) / NS_PER_S
+            text = f"the clock of {self.stream.label} was set {way} by {size_s:.4g} s; time runs on"
+            self.told.append(Told(kind="clock", time_ns=after_ns - self._shift_ns, text=text))
+
+    def _fitted(self, time_ns: Whole, sizes: Whole | None) -> tuple[Whole, Whole, ClockSteps]:
         stated = StatedRate(hz=self.rate_hz, named=True)
         nothing = np.zeros(time_ns.size, np.int64)
         try:
@@ -281,10 +294,10 @@ class StreamPlaces:
                 stated=stated,
             )
         except EstimateError:
-            return nothing[:0], nothing
+            return nothing[:0], nothing, ClockSteps()
         if not found.index.size:
-            return nothing[:0], nothing
-        return found.index, nothing if found.taken is None else found.taken
+            return nothing[:0], nothing, ClockSteps()
+        return found.index, nothing if found.taken is None else found.taken, found.time_base.clock
 
     def _spread(self, part: Piece, time_ns: Whole, index: Whole, taken: Whole) -> PlacedMessages:
         sizes = np.ones(index.size, np.int64) if part.counts is None else part.counts

@@ -151,3 +151,11 @@ def test_a_file_that_becomes_shorter_ends_with_a_word(tmp_path: Path) -> None:
     source.close()
     assert found.ended
     assert "became shorter" in found.told[0]
+
+
+def test_messages_that_are_sent_again_are_told_and_not_taken_in_silence(tmp_path: Path) -> None:
+    stamps = np.concatenate((STAMPS[:2000], STAMPS[1900:2900]))
+    path = write_imus(tmp_path / "a.mcap", stamps, log_ns=START_NS + np.arange(stamps.size) * 2_000_000)
+    blocks, told = live_of(path)
+    np.testing.assert_array_equal(joined(blocks), finished(path))
+    assert "clock" in {one.kind for one in told}
