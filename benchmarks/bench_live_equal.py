@@ -73,6 +73,8 @@ def served(path: Path) -> FoxgloveServer:
     source = FoxgloveServer(f"ws://127.0.0.1:{port}", patience_s=6.0)
     time.sleep(1.0)
 
+    holding = [context]
+
     def send() -> None:
         begun_s, start_ns = time.monotonic(), messages[0][2].log_time
         for number, (_, channel, message) in enumerate(messages):
@@ -81,6 +83,8 @@ def served(path: Path) -> FoxgloveServer:
                 time.sleep(max(0.0, begun_s + (message.log_time - start_ns) / 4e9 - time.monotonic()))
         time.sleep(10.0)
         server.stop()
+        # The context closes its channels when nobody holds it.
+        del holding[:]
 
     threading.Thread(target=send, daemon=True).start()
     return source

@@ -442,7 +442,7 @@ class _Session:
         for note in notes:
             self._once(note)
         try:
-            if (spectra := self._pairs.pop(channels, None)) is None:
+            if (spectra := self._pairs.pop(tuple(channels), None)) is None:
                 return None
             whole = spectra.select(names)
             recent = whole if len(channels) > MOST_FADING else grid.averages.recent_spectra().select(names)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from chladni.io.live.followed_log import Silence
 from chladni.io.live.reception import Samples, Told
-from chladni.io.setup import ChannelSetup, Setup, refined
+from chladni.io.setup import Setup, refined
 from chladni.signals.channel import Channel, find_channel
 from chladni.signals.errors import LogError
 from chladni.signals.geometry import Geometry
@@ -170,7 +170,7 @@ class LiveInstrument:
         self._thread.join(timeout=5.0)
 
     def _refined(self, channel: Channel) -> tuple[Channel, float]:
-        own = [one for one in self._setup.channels if isinstance(one, ChannelSetup) and one.path == channel.name]
+        own = [one for one in self._setup.channels if one.path == channel.name]
         return refined(channel, 1.0, own[0]) if own else (channel, 1.0)
 
     def _run(self) -> None:

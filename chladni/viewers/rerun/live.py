@@ -29,6 +29,8 @@ from chladni.viewers.style import Style, amplitude_colours
 
 #: Seconds of waveform that are seen at a time.
 SCROLL_S: Final = 5.0
+#: Seconds over which modes are seen.
+MODES_S: Final = 120.0
 #: Values a second that are drawn as they are; of more, the extremes of stretches.
 VALUES_A_SECOND: Final = 300_000
 #: How often curves are redrawn, and waterfalls, which weigh more, in seconds of the source.
@@ -375,7 +377,7 @@ class LiveDrawing:
         ]
         events = rrb.TextLogView(origin="/events", name="What happened and changed")
         modes = rrb.Horizontal(
-            rrb.TimeSeriesView(origin="/modes", name="Modes of the present [Hz]"),
+            rrb.TimeSeriesView(origin="/modes", name="Modes of the present [Hz]", axis_x=_last(MODES_S)),
             rrb.TextDocumentView(origin="/mode_table", name="Modes of the present"),
             column_shares=[1, 1.1],
             name="Modes",
@@ -414,14 +416,10 @@ class LiveDrawing:
         return path.startswith(f"{parent}/") and not path.endswith("/legend")
 
     def _scroll(self, path: str, name: str) -> rrb.View:
-        boundary = rr.TimeRangeBoundary
-        window = rr.TimeRange(
-            start=boundary.cursor_relative(seconds=-SCROLL_S), end=boundary.cursor_relative(seconds=0.0)
-        )
         return rrb.TimeSeriesView(
             origin=path,
             name=visible(name),
-            axis_x=rrb.TimeAxis(view_range=window),
+            axis_x=_last(SCROLL_S),
             plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.LeftTop),
         )
 
@@ -431,13 +429,23 @@ class LiveDrawing:
         if canvas is None:
             raise AssertionError("a plane without a canvas has no view")
         # Above stands the name of the axis.
-        return canvas.view(path, name, above=100.0)
+        return canvas.view(path, name, left=110.0, above=100.0)
 
     def _fall_view(self, path: str) -> rrb.View:
         canvas = self._planes[path].canvas
         if canvas is None:
             raise AssertionError("a waterfall without a canvas has no view")
         return canvas.view(path, self._planes[path].path)
+
+
+def _last(seconds: float) -> rrb.TimeAxis:
+    """An axis of so many seconds up to the cursor."""
+    boundary = rr.TimeRangeBoundary
+    return rrb.TimeAxis(
+        view_range=rr.TimeRange(
+            start=boundary.cursor_relative(seconds=-seconds), end=boundary.cursor_relative(seconds=0.0)
+        )
+    )
 
 
 def _stack(views: Sequence[rrb.View]) -> rrb.Container:

@@ -7,6 +7,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, TYPE_CHECKING, Final, Self
@@ -337,7 +338,7 @@ class Painter:
             more = states[-1] is not None
             waiting = [state for state in states if state is not None]
             if waiting and not self._failed.is_set():
-                self._draw(lambda some=waiting: self.target.draw(some))
+                self._draw(partial(self.target.draw, waiting))
         self._end()
 
     def _draw(self, work: Callable[[], None]) -> bool:
