@@ -62,17 +62,17 @@ def test_a_recording_holds_every_sample_and_every_event(tmp_path: Path) -> None:
 
 
 def test_a_recording_is_bounded_and_both_its_files_are_whole(tmp_path: Path) -> None:
-    most = 400_000
+    most = 4_000_000
     target = RecordingFile(tmp_path / "a.rrd", keep_bytes=most)
     with Painter(target) as painter:
-        for state in states(150, samples=500):
+        for state in states(60, samples=10_000):
             assert painter.show(state) == ()
-            time.sleep(0.002)
     sizes = [path.stat().st_size for path in (target.path, target.earlier)]
-    # A turn comes after the state that filled a file, and with a blueprint.
-    assert sum(sizes) < 1.5 * most
+    # A turn comes after four states at most, each of a quarter of a megabyte.
+    assert sum(sizes) < most + 2 * 1_200_000
+    assert sum(sizes) > most / 2
     last = [float(Contents(path).times("/waveforms/1/acceleration", "time")[-1]) / 1e9 for path in tmp_path.iterdir()]
-    assert max(last) == pytest.approx(75.0 - 1 / RATE_HZ)
+    assert max(last) == pytest.approx(600.0 - 1 / RATE_HZ)
 
 
 def test_a_disk_that_is_full_is_told_and_the_states_go_on() -> None:

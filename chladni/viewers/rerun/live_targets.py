@@ -7,6 +7,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 #: States that wait for a slow viewer or disk; beyond, they are left out of the picture.
 WAITING: Final = 64
+#: States written at a time, between looks at the size of the file.
+TOGETHER: Final = 4
 #: A recording may hold its source up for so long at a state: longer than any disk needs that works.
 PATIENCE_S: Final = 1.0
 #: At the end a viewer gets so long to take what waits for it.
@@ -106,12 +109,13 @@ class RecordingFile(Target):
     def draw(self, states: Sequence[LiveState]) -> None:
         """Draw states; OSError when the disk is full."""
         self._drawn = True
-        for state in states:
-            self._drawing.draw(state, curves=state is states[-1])
-        self._recording.flush(timeout_sec=LAST_S)
-        self._way.require_sound()
-        if self._most is not None and self._way.written > self._most:
-            self._turn(states[-1])
+        for first in range(0, len(states), TOGETHER):
+            for state in states[first : first + TOGETHER]:
+                self._drawing.draw(state, curves=state is states[-1])
+            self._recording.flush(timeout_sec=LAST_S)
+            self._way.require_sound()
+            if self._most is not None and self._way.written > self._most:
+                self._turn(states[-1])
 
     def _turn(self, state: LiveState) -> None:
         """Go on in a new file, which holds all averages again; the one before the present goes."""
@@ -119,7 +123,9 @@ class RecordingFile(Target):
         self.earlier.unlink(missing_ok=True)
         self.path.replace(self.earlier)
         self._begin()
-        self.draw([state])
+        self._drawn = True
+        # Its samples, a moment long, are in both files.
+        self._drawing.draw(replace(state, events=()))
 
     def _finish(self) -> None:
         # The blueprint goes last: rerun 0.41 has lost rows that followed one in a file (rerun issue 12769).
