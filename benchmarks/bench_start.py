@@ -49,6 +49,8 @@ def main() -> None:
         small_log(log)
         size = log.stat().st_size / 1e6
         rows.append((f"`chladni info` of a log of {size:.1f} MB", shortest_s([PROGRAM, "info", str(log)]), 1.0))
+        figures = [PROGRAM, "psd", str(log), "--figures", str(Path(folder) / "figures")]
+        rows.append(("`chladni psd --figures` of that log, the first picture", shortest_s(figures), 2.0))
         building = data / "palisaden.mcap"
         if building.exists():
             rrd = str(Path(folder) / "building.rrd")
