@@ -174,3 +174,22 @@ def test_a_force_and_an_empty_channel_are_refused_by_name():
         srs(series(pulse(), rate_hz=RATE_HZ, units=["N"]))
     with pytest.raises(EstimateError, match="a: nothing was measured"):
         srs(series(np.full(100, np.nan), rate_hz=RATE_HZ))
+
+
+@pytest.mark.nightly
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
+@pytest.mark.parametrize(
+    ("theirs", "quantity"),
+    [("absacce", "absolute-acceleration"), ("reldisp", "relative-displacement"), ("pvelo", "pseudo-velocity")],
+)
+def test_pyyeti_agrees_where_a_period_has_32_samples(theirs, quantity):
+    # Above, we compute what lies between the samples, and pyYeti by its defaults does so in another way.
+    yeti = pytest.importorskip("pyyeti.srs")
+    rate_hz, q = 2000.0, 25.0
+    lines_hz = np.geomspace(5.0, rate_hz / 33, 20)
+    signal = noise(1, 4000, seed=8)[0]
+    wanted = yeti.srs(
+        signal, rate_hz, lines_hz, q, stype=theirs, ic="zero", rolloff="none", ppc=1, time="total", parallel="no"
+    )
+    found = srs(series(signal, rate_hz=rate_hz), q=q, quantity=quantity, frequencies_hz=lines_hz, offset="keep")
+    np.testing.assert_allclose(found.maximax[0], np.ravel(wanted), rtol=1e-9)
