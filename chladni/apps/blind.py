@@ -6,6 +6,7 @@ from typing import Any
 
 from chladni.apps.diagnose import diagnosis_json
 from chladni.apps.processes import workers
+from chladni.apps.study.cluster import Connect
 from chladni_withheld.campaign import RunReport, make_cases, run_cases
 from chladni_withheld.score import score_cases
 
@@ -38,7 +39,12 @@ def make_campaign(
 
 
 def run_campaign(
-    directory: Path, *, seed: int = 0, jobs: int | None = None, progress: Progress = lambda _share: None
+    directory: Path,
+    *,
+    seed: int = 0,
+    jobs: int | None = None,
+    connect: Connect | None = None,
+    progress: Progress = lambda _share: None,
 ) -> RunReport:
     """Diagnose every case that has no result yet; the truth isn't opened.
 
@@ -48,7 +54,17 @@ def run_campaign(
         See `chladni_withheld.campaign.run_cases`.
     jobs
         Processes; as many as the machine has cores if None.
+    connect
+        Gives a client of a cluster whose workers see the folder under the same name, in place of processes; see
+        `chladni.apps.study.cluster.cluster`.
     """
+    if connect is not None:
+        with connect() as client:
+            # Dask does a case of a lost worker again. What raises is a defect, and would be one again.
+            return run_cases(
+                directory.resolve(), diagnosis_json, seed=seed, executor=client.get_executor(retries=0),
+                progress=progress,
+            )  # fmt: skip
     with workers(jobs) as executor:
         return run_cases(directory, diagnosis_json, seed=seed, executor=executor, progress=progress)
 

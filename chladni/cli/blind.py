@@ -83,10 +83,21 @@ def run(
         ),
     ] = 0,
     jobs: Jobs = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Of a Dask scheduler whose workers see DIR, in place of processes: tls://HOST:PORT.",
+            show_default=False,
+        ),
+    ] = None,
     json: options.Json = None,
 ) -> None:
     """Diagnose every case that has no result yet; the truths are never opened."""
+    from functools import partial
+
     from chladni.apps.blind import run_campaign
+    from chladni.apps.study.cluster import cluster
     from chladni.gap.kept_memory import keep_memory
 
     require_places(reads=(), writes={"--json": json}, folders={"DIR": directory})
@@ -94,7 +105,8 @@ def run(
     # With one job this process is the worker.
     keep_memory()
     with to.progress("diagnosing") as show:
-        report = run_campaign(directory, seed=seed, jobs=jobs, progress=show)
+        connect = None if scheduler is None else partial(cluster, workers=jobs, scheduler=scheduler)
+        report = run_campaign(directory, seed=seed, jobs=jobs, connect=connect, progress=show)
     to.line(f"diagnosed {counted(report.done)} cases; {counted(report.there)} had a result")
     if report.failed:
         to.lines([f"Warning: no answer for {', '.join(report.failed)}; their results say why"])

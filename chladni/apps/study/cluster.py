@@ -2,13 +2,13 @@
 
 import logging
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from ipaddress import ip_address
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 from urllib.parse import urlsplit
 
 from chladni.signals.errors import SetupError
@@ -17,9 +17,12 @@ if TYPE_CHECKING:
     from distributed import Client
     from distributed.security import Security
 
+#: Gives a client of workers when there is something to do.
+Connect = Callable[[], "AbstractContextManager[Client]"]
 #: A scheduler that doesn't answer for so long isn't there.
 CONNECT_S: Final = 20.0
 LOOPBACK: Final = "127.0.0.1"
+_BEFORE_WORKERS: Final = "distributed.nanny.pre-spawn-environ"
 _LOGGERS: Final = ("distributed", "tornado", "asyncio")
 
 
@@ -128,7 +131,7 @@ def _of_this_machine(workers: int | None, *, dashboard: bool) -> "Iterator[Clien
             dashboard_address=f"{LOOPBACK}:0",
             scheduler_kwargs={"dashboard": dashboard},
             local_directory=folder,
-            silence_logs=logging.CRITICAL,
+            silence_logs=False,
             # A log is bounded by its reader, not by half a machine.
             memory_limit=0,
         ) as local,
@@ -175,6 +178,7 @@ def _of_scheduler(scheduler: str, keys: Keys) -> "Iterator[Client]":
 @contextmanager
 def _settings() -> "Iterator[None]":
     import dask
+    import distributed  # noqa: F401  # brings its settings into those of dask
 
     with dask.config.set(
         {
@@ -183,6 +187,8 @@ def _settings() -> "Iterator[None]":
             "distributed.comm.timeouts.connect": f"{CONNECT_S:g}s",
             "distributed.admin.tick.limit": "1h",
             "distributed.diagnostics.nvml": False,
+            # Workers say nothing either: they find this when they start.
+            _BEFORE_WORKERS: {**dask.config.get(_BEFORE_WORKERS), "DASK_LOGGING__DISTRIBUTED": "critical"},
         }
     ):
         yield
@@ -191,16 +197,17 @@ def _settings() -> "Iterator[None]":
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Let Dask's own words on lost workers and closed lines go nowhere: what is lost is told in ours."""
-    before: dict[str, Any] = {}
+    # Not by its level: that of the parent decides whether a worker that was ended is started again.
+    before: dict[str, tuple[list[logging.Handler], bool]] = {}
     for name in _LOGGERS:
         logger = logging.getLogger(name)
-        before[name] = logger.level
-        logger.setLevel(logging.CRITICAL + 1)
+        before[name] = ([*logger.handlers], logger.propagate)
+        logger.handlers, logger.propagate = [logging.NullHandler()], False
     try:
         yield
     finally:
-        for name, level in before.items():
-            logging.getLogger(name).setLevel(level)
+        for name, (handlers, propagate) in before.items():
+            logging.getLogger(name).handlers, logging.getLogger(name).propagate = handlers, propagate
 
 
 def cores() -> int:

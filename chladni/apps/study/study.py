@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from chladni.apps.study.cluster import Connect
 from chladni.apps.study.engine import Answer, Engine
 from chladni.apps.study.work import Task, work_on
 from chladni.io.study.folder import StudyFolder, opened_folder
@@ -13,13 +14,7 @@ from chladni.io.study.logs import LogAddress, find_logs
 from chladni.io.study.recipe import Recipe
 from chladni.io.study.tables import packed, tables_of
 
-if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
-
-    from distributed import Client
-
 Progress = Callable[[float], None]
-Connect = Callable[[], "AbstractContextManager[Client]"]
 #: Between two times that what is done is put into the tables, at least.
 SETTLE_EVERY_S: Final = 30.0
 

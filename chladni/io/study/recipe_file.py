@@ -162,7 +162,6 @@ class RecipeFile(_Table):
     format: Literal["chladni.study/1"]
     setup: Text | None = None
     documents: Flag = False
-    split_larger_than_mb: Positive | None = None
     open: OpenTable = OpenTable()
     info: InfoTable | None = None
     psd: PsdTable | None = None

@@ -1,6 +1,8 @@
 """Studies against the single commands: the same documents, the same rows, whatever goes wrong on the way."""
 
+import os
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import nullcontext
 from functools import partial
@@ -235,3 +237,36 @@ def test_a_store_that_is_gone_is_a_row_and_tried_again(client: Any, recipe: Path
     second = run_study(load_recipe(recipe), addresses, tmp_path / "out", connect=partial(nullcontext, client))
     assert (second.done, second.failures) == (1, [])
     assert not len(chladni.results(tmp_path / "out").table("failures"))
+
+
+def test_withheld_cases_run_on_the_same_cluster(client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from chladni.apps import blind
+    from chladni_withheld.campaign import make_cases
+
+    make_cases(tmp_path, count=2, seed=3, kinds=["none=1"])
+
+    def judged(model: Path, logs: Any, *, leave_out: frozenset[str], seed: int) -> dict[str, object]:
+        assert model.is_file()
+        return {"format": "chladni.gap/1", "seed": seed, "logs": len(logs), "without": sorted(leave_out)}
+
+    monkeypatch.setattr(blind, "diagnosis_json", judged)
+    report = blind.run_campaign(tmp_path, seed=5, connect=partial(nullcontext, client))
+    assert (report.done, report.there, report.failed) == (2, 0, ())
+    assert len(list((tmp_path / "results").glob("case-*.json"))) == 2
+    assert blind.run_campaign(tmp_path, connect=partial(nullcontext, client)).there == 2
+
+
+@pytest.mark.nightly
+def test_a_worker_that_was_ended_is_started_again() -> None:
+    from chladni.apps.study.cluster import cluster
+
+    with cluster(workers=1) as own:
+        [first] = own.run(os.getpid).values()
+        os.kill(first, 9)
+        deadline = time.monotonic() + 120
+        # The scheduler needs a moment to see that it's gone.
+        time.sleep(2)
+        while not own.nthreads() and time.monotonic() < deadline:
+            time.sleep(0.5)
+        [second] = own.run(os.getpid).values()
+        assert second != first

@@ -54,7 +54,8 @@ def write_year(out: Path, *, seed: int = 0, damage: float = 0.006, louder: float
             now_hz = frequency_hz * (1 - 0.002 * warm) * damaged + 0.003 * rng.standard_normal()
             rows["modes"].append(
                 {**start, "mode": mode, "frequency_hz": now_hz, "frequency_std_hz": 0.003, "damping_ratio": 0.01,
-                 "damping_std": 0.001, "channels": ["/tip.x", "/root.x"], "shape_real": shape, "shape_imag": [0.0, 0.0]}
+                 "damping_std": 0.001, "channels": ["/tip.x", "/root.x"], "shape_real": shape,
+                 "shape_imag": [0.0, 0.0]}
             )  # fmt: skip
     with opened_folder(out, "made", "made") as folder:
         folder.take(packed(tables_of(rows)), {}, source="a test")
