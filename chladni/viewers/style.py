@@ -57,6 +57,15 @@ def mac_colours(mac: NDArray[np.floating]) -> Bytes:
     return _colours(LIKENESS, mac)
 
 
+def level_colours(share: NDArray[np.floating]) -> Bytes:
+    """Give ``[..., rgb]`` of levels of a waterfall from 0 to 1, on a dark ground; what isn't known is grey."""
+    return np.where(np.isnan(share)[..., None], np.uint8(UNKNOWN), _colours(LIKENESS, share))
+
+
+# In no part of the scale: what is missing can't be taken for a low level.
+UNKNOWN = 110
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Style:
     """Label and colour number of each channel of a study, by channel name.

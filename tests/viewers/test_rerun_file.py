@@ -11,15 +11,18 @@ import rerun as rr
 from hypothesis import given
 from hypothesis import strategies as st
 
+from chladni.signals.arrays import Bytes
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
 from chladni.signals.geometry import Geometry
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
+from chladni.viewers.drawing import block_maximum, colour_range, decibels_of_power
 from chladni.viewers.rerun import waterfall as waterfall_module
 from chladni.viewers.rerun import waveforms, write_rrd
 from chladni.viewers.rerun.entities import channel_entity, folder
 from chladni.viewers.rerun.tensors import TensorColumn
+from chladni.viewers.style import level_colours
 from tests.viewers import synthetic
 from tests.viewers.headless import EXECUTABLE
 from tests.viewers.rrd import Contents
@@ -139,15 +142,52 @@ def test_deflection_goes_back_to_rest_after_the_band(arm: Contents) -> None:
     assert arm.column(entity, "Points3D:positions")[-1] is None
 
 
-def test_waterfall_is_a_tensor_in_decibels(arm: Contents) -> None:
+def picture_of(contents: Contents, entity: str) -> Bytes:
+    """``[row, column, rgb]`` of an image."""
+    buffer = contents.static(entity)["Image:buffer"][0]
+    pixels = np.frombuffer(buffer, dtype=np.uint8) if isinstance(buffer, bytes) else np.array(buffer, dtype=np.uint8)
+    return pixels.reshape(waterfall_module.HEIGHT, waterfall_module.WIDTH, 3)
+
+
+def test_waterfall_is_an_image_of_its_decibels_on_axes_with_numbers(arm: Contents) -> None:
     waterfall = synthetic.waterfall()
-    look = arm.static(channel_entity("/waterfall/1", synthetic.RESPONSES[2]))
-    tensor = look["Tensor:data"][0]
-    assert tensor["shape"] == [waterfall.time_s.size, waterfall.frequency_hz.size]
-    assert tensor["names"] == ["time 2–38 s", "frequency 0–128 Hz"]
-    level = np.array(tensor["buffer"]).reshape(tensor["shape"])
-    # float32 carries 24 bits of the decibels.
-    np.testing.assert_allclose(level[:, 1:], 10 * np.log10(waterfall.values[3, :, 1:]), rtol=1e-6)
+    entity = channel_entity("/waterfall/1", synthetic.RESPONSES[2])
+    picture = picture_of(arm, entity)
+    # Ten slices of 64 pixels each; frequencies in blocks that hold the greatest, the lowest at the bottom.
+    greatest, _ = block_maximum(waterfall.values[3], axis=1, limit=waterfall_module.HEIGHT)
+    level = decibels_of_power(greatest)
+    low, high = colour_range([level], most_db=80.0)
+    row = 30
+    cell = (waterfall_module.HEIGHT - 1 - row) * level.shape[1] // waterfall_module.HEIGHT
+    wanted = level_colours((level[:, cell] - low) / (high - low))
+    np.testing.assert_array_equal(picture[row, 32::64], wanted)
+    numbers = arm.static(f"{entity}/axes/numbers")["Points2D:labels"]
+    assert {"20", "100", "Hz", "s"} <= set(numbers)
+
+
+def test_the_cursor_in_the_waterfall_is_where_its_slice_is(arm: Contents) -> None:
+    waterfall = synthetic.waterfall()
+    entity = channel_entity("/waterfall/1", synthetic.RESPONSES[2])
+    np.testing.assert_array_equal(
+        arm.times(f"{entity}/cursor", "time"),
+        arm.times(channel_entity("/spectrum/1", synthetic.RESPONSES[2]), "time"),
+    )
+    strips = np.array(arm.column(f"{entity}/cursor", "LineStrips2D:strips"))[:, 0]
+    middles = (np.arange(waterfall.time_s.size) + 0.5) / waterfall.time_s.size * waterfall_module.WIDTH
+    np.testing.assert_allclose(strips[:, :, 0], np.column_stack([middles, middles]), rtol=1e-6)
+
+
+def test_where_the_cursor_is_at_first_there_is_a_spectrum_and_a_shape(tmp_path: Path) -> None:
+    waterfall = synthetic.waterfall()
+    # As of segments that overlap: half of the first lies before the first slice's part.
+    late = replace(waterfall, time_s=waterfall.time_s + 7.0)
+    contents = Contents(write_rrd(replace(synthetic.study(), waterfalls=(late,)), tmp_path / "late.rrd"))
+    assert contents.times(channel_entity("/spectrum/1", synthetic.FORCE), "time")[0] == 0
+    moved = "/deflection/reference_1/moved/arrows"
+    ticks = contents.times(moved, "time")
+    vectors = contents.column(moved, "Arrows3D:vectors")
+    assert ticks[0] == 0
+    assert vectors[0] == vectors[int(np.flatnonzero(ticks == synthetic.PEAK_HZ * 1e6)[0])]
 
 
 def test_spectrum_under_the_cursor_is_the_nearest_slice(arm: Contents) -> None:
@@ -233,13 +273,15 @@ def test_a_series_too_long_for_a_viewer_keeps_its_extremes_and_says_so(
 def test_a_waterfall_too_large_for_a_screen_keeps_its_peaks_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(waterfall_module, "PIXELS", 100)
+    monkeypatch.setattr(waterfall_module, "HEIGHT", 100)
     path = write_rrd(Study(title="large", waterfalls=(synthetic.waterfall(),)), tmp_path / "large.rrd")
-    tensor = Contents(path).static(channel_entity("/waterfall/1", synthetic.RESPONSES[2]))["Tensor:data"][0]
-    assert tensor["shape"] == [10, 86]
-    expected = 10 * np.log10(synthetic.waterfall().values[3].max())
-    assert any(name.endswith("greatest of every 6 lines") for name in Contents(path).view_names())
-    assert max(tensor["buffer"]) == pytest.approx(expected, rel=1e-6)
+    contents = Contents(path)
+    assert any(name.endswith("greatest of every 6 lines") for name in contents.view_names())
+    level = decibels_of_power(synthetic.waterfall().values[3])
+    slice_, line = np.unravel_index(int(np.nanargmax(level)), level.shape)
+    picture = picture_of(contents, channel_entity("/waterfall/1", synthetic.RESPONSES[2]))
+    row = 99 - round((int(line) // 6 + 0.5) * 100 / 86)
+    np.testing.assert_array_equal(picture[row, int(slice_) * 64 + 32], level_colours(np.array([1.0]))[0])
 
 
 def test_names_that_try_to_break_paths_come_back_whole(tmp_path: Path) -> None:
@@ -272,9 +314,8 @@ def test_several_references_have_a_page_and_a_shape_each(tmp_path: Path) -> None
     np.testing.assert_allclose(other - first, 20 * np.log10(2), rtol=1e-12)
     names = contents.view_names()
     assert names.count("Multiple coherence γ² [1]") == 2
-    assert {"Deflection shape to hammer.x, size normalised", "Deflection shape to shaker.z, size normalised"} <= set(
-        names
-    )
+    shapes = [name for name in names if name.startswith("Deflection shape to ")]
+    assert [name.split()[3] for name in shapes] == ["hammer.x,", "shaker.z,"]
 
 
 def test_series_of_one_quantity_are_told_apart(tmp_path: Path) -> None:

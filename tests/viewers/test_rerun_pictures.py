@@ -60,9 +60,8 @@ def test_the_arrangement_is_ours(arm: HeadlessViewer) -> None:
     assert {kind: kinds.count(kind) for kind in set(kinds)} == {
         "TextDocument": 1,
         "TimeSeries": 2 + 2 + 3 + 4,
-        "Tensor": 4,
         "BarChart": 4,
-        "2D": 1,
+        "2D": 1 + 4,
         "3D": 1,
     }
 

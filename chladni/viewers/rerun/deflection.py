@@ -1,7 +1,7 @@
 """Operating deflection shapes: how the measured points move at the frequency under the cursor."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -42,11 +42,16 @@ def draw_deflections(
     wireframe = Wireframe.of(study.geometry, response.responses)
     if wireframe is None:
         return []
-    return [_draw(recording, wireframe, response, style, column) for column in range(len(response.references))]
+    return [_draw(recording, study, wireframe, response, style, column) for column in range(len(response.references))]
 
 
 def _draw(
-    recording: rr.RecordingStream, wireframe: Wireframe, response: FrequencyResponse, style: Style, column: int
+    recording: rr.RecordingStream,
+    study: Study,
+    wireframe: Wireframe,
+    response: FrequencyResponse,
+    style: Style,
+    column: int,
 ) -> Callable[[], rrb.View]:
     parent = folder("deflection", f"reference {column + 1}")
     shape = _Shape(
@@ -55,13 +60,34 @@ def _draw(
         motion=wireframe.motion(response.values[:, column, response.excited].T),
     )
     draw_rest(recording, parent, wireframe)
-    _draw_motion(recording, parent, shape)
+    first = _telling(study, shape, response.references[column].name)
+    _draw_motion(recording, parent, shape, first)
     reference = style.labels[response.references[column].name]
-    return partial(shape_view, parent, f"Deflection shape to {reference}, size normalised", wireframe)
+    name = f"Deflection shape to {reference}, size normalised"
+    if shape.frequency_hz[0] > 0:
+        name += f" · first at {shape.frequency_hz[first]:.4g} Hz"
+    return partial(shape_view, parent, name, wireframe)
 
 
-def _draw_motion(recording: rr.RecordingStream, parent: str, shape: _Shape) -> None:
-    """Points at their furthest, the wireframe through them, and an arrow from where each measured point rests."""
+def _telling(study: Study, shape: _Shape, reference: str) -> int:
+    """Line of the highest peak, or of the greatest amplitude where no peak is named: what is shown at first."""
+    peaks = [peak.frequency_hz for peak in study.response_peaks if peak.channels[-1:] == (reference,)]
+    if peaks:
+        return int(np.argmin(np.abs(shape.frequency_hz - peaks[0])))
+    return int(np.argmax(amplitude(shape.motion).max(axis=1)))
+
+
+def _draw_motion(recording: rr.RecordingStream, parent: str, shape: _Shape, first: int) -> None:
+    """Points at their furthest, the wireframe through them, and an arrow from where each measured point rests.
+
+    Below the band, where the cursor is when a file opens, stands the shape of line `first`.
+    """
+    if shape.frequency_hz[0] > 0:
+        shape = replace(
+            shape,
+            frequency_hz=np.concatenate([[0.0], shape.frequency_hz]),
+            motion=np.concatenate([shape.motion[first : first + 1], shape.motion]),
+        )
     wireframe, size = shape.wireframe, shape.wireframe.size
     measured = wireframe.measured
     arrows = furthest(shape.motion) * DRAWN_SHARE * size

@@ -48,7 +48,9 @@ def _draw_channel(
     _log_look(recording, path, abscissa, widths, style.on_dark(channel))
     bars = np.sqrt(slices)
     fits = _held_by_bars(bars)
-    _log_bars(recording, path, _starts_ns(waterfall, style)[::times], bars if fits else np.full(bars.shape, np.nan))
+    _log_bars(
+        recording, path, slice_starts_ns(waterfall, style)[::times], bars if fits else np.full(bars.shape, np.nan)
+    )
     return rrb.BarChartView(
         origin=path,
         name=f"{style.labels[channel.name]} at the time cursor [{amplitude_density_unit(channel.unit)}] over Hz"
@@ -87,12 +89,13 @@ def _held_by_bars(bars: NDArray[np.floating]) -> bool:
     return bool(largest == 0 or single.tiny <= largest <= single.max)
 
 
-def _starts_ns(waterfall: Waterfall, style: Style) -> Whole:
+def slice_starts_ns(waterfall: Waterfall, style: Style) -> Whole:
     """Times from which each slice is the nearest to the cursor; the viewer shows the latest before it."""
     hop_s = _step(waterfall.time_s)
     since_origin_ns = waterfall.start_time_ns - style.origin_ns
-    # The first slice is there from second zero, where the cursor is when a file opens.
     starts_s = np.maximum(waterfall.time_s - hop_s / 2, 0.0)
+    # The first slice is there from its first sample on, where the cursor is when a file opens.
+    starts_s[:1] = 0.0
     return np.asarray(np.rint(starts_s * NS_PER_S).astype(np.int64) + since_origin_ns)
 
 
