@@ -72,7 +72,14 @@ parts.update_bbox = function () {
 START_JS = (
     "Bokeh.Models.CustomJSTickFormatter.prototype.doFormat = (all) => all.map((tick, index, ticks) => {"
     f"{TICK_JS}}});\n{_LAYOUT_JS}"
-    'Bokeh.embed.embed_items("{}", JSON.parse(document.getElementById("chladni").textContent));\n'
+    # Bokeh's colours are the server's: a dark screen is sent to the dark page, unless the address says.
+    "const asked = new URL(location.href);\n"
+    'if (!asked.searchParams.has("theme") && matchMedia("(prefers-color-scheme: dark)").matches) {\n'
+    '  asked.searchParams.set("theme", "dark");\n'
+    "  location.replace(asked);\n"
+    "} else {\n"
+    '  Bokeh.embed.embed_items("{}", JSON.parse(document.getElementById("chladni").textContent));\n'
+    "}\n"
 )
 
 

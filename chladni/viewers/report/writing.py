@@ -7,6 +7,7 @@ from pathlib import Path
 from chladni.io.atomic import atomic_write
 from chladni.signals.study import Study
 from chladni.viewers.figures import Album
+from chladni.viewers.finding_groups import FindingGroup, told_findings
 from chladni.viewers.report.markup import element, escaped, page
 from chladni.viewers.report.modes import modes_section, relative_motion_section
 from chladni.viewers.report.pictures import Pictures, sections
@@ -62,7 +63,7 @@ def _body(study: Study, shown: Mapping[str, str]) -> Iterator[str]:
     style = Style.of(study)
     yield element("h1", escaped(study.title))
     if study.findings:
-        yield _section("Findings", element("ul", "".join(element("li", escaped(text)) for text in study.findings)))
+        yield _section("Findings", _findings(study, style))
     yield from _modes(study, style)
     # Numbers stand under the curves that they are read from.
     tables = {
@@ -74,6 +75,23 @@ def _body(study: Study, shown: Mapping[str, str]) -> Iterator[str]:
         yield _section(heading, figures + peak_table(peaks, style, channels=channels))
     yield _section("Channels", channel_table(study, style))
     yield _section("Method", method_table(study))
+
+
+def _findings(study: Study, style: Style) -> str:
+    told = told_findings(study.findings, style.labels)
+    shown = "".join(_finding(group) for group in told.groups)
+    names = f"Paths below begin with {told.prefix}. " if told.prefix else ""
+    note = element("p", escaped(f"{names}Short names are those of the table of channels."), class_="note")
+    return note + element("ul", shown)
+
+
+def _finding(group: FindingGroup) -> str:
+    if not group.subject:
+        return "".join(element("li", escaped(one)) for one in group.findings)
+    subject = element("code", escaped(group.subject))
+    if len(group.findings) == 1:
+        return element("li", f"{subject}: {escaped(group.findings[0])}")
+    return element("li", subject + element("ul", "".join(element("li", escaped(one)) for one in group.findings)))
 
 
 def _modes(study: Study, style: Style) -> Iterator[str]:

@@ -324,6 +324,20 @@ def test_dark_ground(page: Any) -> None:
 
 
 @needs_chromium
+def test_a_dark_screen_gets_the_dark_page_unless_the_address_asks_for_the_light_one(page: Any, address: str) -> None:
+    own = address.split()[0] + "oscillator"
+    page.emulate_media(color_scheme="dark")
+    try:
+        page.goto(own)
+        page.wait_for_url("**?theme=dark")
+        page.locator(".noUi-handle").first.wait_for()
+        open_page(page, f"{own}?theme=light")
+        assert page.url.endswith("?theme=light")
+    finally:
+        page.emulate_media(color_scheme="light")
+
+
+@needs_chromium
 def test_rows_of_a_file_appear_while_it_grows(browser: Any, address: str, rows: Path) -> None:
     page = open_page(browser, address.split()[1])
     page.get_by_role("button", name="row m 3").wait_for()
