@@ -159,7 +159,7 @@ def _word(line: Line2D) -> str:
 def _draw_line(axes: Axes, target: Target, line: Line2D) -> None:
     across, up = _places(axes, line)
     colour = _hex(line.get_color())
-    look = {
+    look: dict[str, Any] = {
         "line_color": colour,
         "line_width": max(line.get_linewidth() * PIXELS_A_POINT, 0.8),
         "line_dash": _DASHES.get(str(line.get_linestyle()), "dashed"),
@@ -395,7 +395,7 @@ def _draw_text(axes: Axes, target: Target, text: Text, names: list[float]) -> No
         if any(abs(share - other) < apart for other in names):
             return
         names.append(share)
-    look = {
+    look: dict[str, Any] = {
         "text": inert(text.get_text()),
         "text_color": _hex(text.get_color()),
         "text_font_size": "10.5px",
@@ -407,19 +407,17 @@ def _draw_text(axes: Axes, target: Target, text: Text, names: list[float]) -> No
     place_x = x if across else _unshared(axes.get_xlim(), x, log=axes.get_xscale() == "log")
     top = target.plot.y_range.end if target.range_name == "default" else target.plot.extra_y_ranges["right"].end
     inside = not across and x >= 1.0
-    target.plot.add_layout(
-        Label(
-            x=place_x,
-            y=float(target.up([y])[0]) if up else top,
-            text_align="right" if inside or (upright and not up) else text.get_horizontalalignment(),
-            text_baseline=("middle" if upright else "top")
-            if not up
-            else _BASELINES.get(text.get_verticalalignment(), text.get_verticalalignment()),
-            y_range_name=target.range_name,
-            y_offset=0 if up else -3,
-            **look,
-        )
-    )
+    # Inside the top of the frame, where it stands above it on paper.
+    baseline = text.get_verticalalignment() if up else ("middle" if upright else "top")
+    look |= {
+        "x": place_x,
+        "y": float(target.up([y])[0]) if up else top,
+        "text_align": "right" if inside or (upright and not up) else text.get_horizontalalignment(),
+        "text_baseline": _BASELINES.get(baseline, baseline),
+        "y_range_name": target.range_name,
+        "y_offset": 0 if up else -3,
+    }
+    target.plot.add_layout(Label(**look))
 
 
 def _unshared(limits: tuple[float, float], share: float, *, log: bool) -> float:

@@ -11,8 +11,9 @@ from chladni.signals.wording import with_sigma
 from chladni.viewers.figures.album import Album
 from chladni.viewers.figures.trends import trend_figures
 from chladni.viewers.labels import printed_unit
-from chladni.viewers.report.markup import PAGE, element, escaped, table
-from chladni.viewers.report.pictures import picture
+from chladni.viewers.report.markup import element, escaped, table
+from chladni.viewers.report.markup import page as whole_page
+from chladni.viewers.report.pictures import Pictures
 
 _CAPTION: Final = (
     "Blue: each log, with one sigma, what covariates explain taken off. Pale: as measured. Black: the level. Red: a "
@@ -60,18 +61,17 @@ def write_trend_report(page: TrendPage, path: Path) -> Path:
 
 
 def trend_report_html(page: TrendPage) -> str:
-    """Give the page as HTML: no script and nothing to fetch."""
+    """Give the page as HTML: nothing to fetch."""
     album = Album(trend_figures(page.trends))
+    pictures = Pictures(album)
     body = [element("h1", escaped(page.title))]
     changes = page.changes or ["Nothing changed beyond what scatter and covariates explain."]
     body.append(_section("What changed", _list(changes)))
     body += [_section(heading, table(*content)) for heading, content in page.tables.items() if content[1]]
-    for heading, figures in album.sections.items():
-        shown = "".join(picture(album, name, _CAPTION) for name in figures)
-        body.append(_section(heading, element("div", shown, class_="figures")))
+    body += [_section(heading, pictures.figures(album, heading, _CAPTION)) for heading in album.sections]
     body.append(_section("All that was followed", table(*_overview(page.trends))))
     body.append(_section("Remarks", _list(page.notes)))
-    return PAGE.substitute(title=escaped(page.title), body="\n".join(filter(None, body)))
+    return whole_page(page.title, "\n".join(filter(None, body)), pictures.scripts())
 
 
 def _overview(trends: Sequence[Trend]) -> Table:

@@ -89,4 +89,4 @@ def _draw_cursor(
     look = rr.LineStrips2D.from_fields(colors=[CURSOR_COLOUR], radii=rr.Radius.ui_points(0.5))
     recording.log(path, look, static=True)
     index = time_index(slice_starts_ns(waterfall, style))
-    send_columns(recording, path, index, rr.LineStrips2D.columns(strips=strips))
+    send_columns(recording, path, index, rr.LineStrips2D.columns(strips=list(strips)))
