@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from chladni.apps.sources import Span, moving_channels
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
@@ -76,9 +78,21 @@ def track_orders(
         maps = tuple(order_map(one, turned, highest_order=highest_order, **window) for one in series)
         wanted = strongest_orders(maps, count=ORDERS_TOLD) if orders is None else orders
         cuts = tuple(order_cuts(one, turned, orders=wanted, method=method, **window) for one in series)
+        _require_shown(cuts)
     except EstimateError as error:
         raise EstimateError(f"{log.path.name}: {error}") from error
     return OrderStudy(rotation=turned, maps=maps, cuts=cuts)
+
+
+def _require_shown(cuts: Sequence[OrderCuts]) -> None:
+    """Raise `EstimateError` when an order is beyond what the samples show at every speed."""
+    for place, order in enumerate(cuts[0].orders.tolist() if cuts else ()):
+        if not any(np.isfinite(one.values[:, place]).any() for one in cuts):
+            slowest_hz = min(float(one.speed_hz.min()) for one in cuts)
+            raise EstimateError(
+                f"order {order:g} is above what the samples show: at {slowest_hz:.4g} Hz, the slowest, it lies at "
+                f"{order * slowest_hz:.4g} Hz; ask for a lower order"
+            )
 
 
 def _moving(groups: Sequence[TimeSeries]) -> tuple[TimeSeries, ...]:

@@ -1,13 +1,15 @@
 """Shock response spectra of a log's accelerations."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-from chladni.apps.sources import Span, moving_channels
+from chladni.apps.sources import Span, moving_channels, still_note
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import EstimateError
 from chladni.signals.shock_response import ShockResponse
+from chladni.signals.time_series import TimeSeries
 from chladni.spectral.shock import ACCELERATIONS, srs
 
 
@@ -51,6 +53,12 @@ def shock_responses(
         kept = moving if any(moving) else chosen
         series = tuple(one.select(names) for one, names in zip(series, kept, strict=True) if names)
     try:
-        return tuple(srs(one, **options) for one in series)
+        return tuple(_told_still(srs(one, **options), one) for one in series)
     except EstimateError as error:
         raise EstimateError(f"{log.path.name}: {error}") from error
+
+
+def _told_still(found: ShockResponse, series: TimeSeries) -> ShockResponse:
+    moving = moving_channels(series)
+    still = [channel.name for channel in series.channels if channel.name not in moving]
+    return replace(found, notes=(*found.notes, *still_note(still)))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.log import Log
+from chladni.io.log_info import some_of
 from chladni.io.log_reader import MostlyEmptyError, several_grids
 from chladni.io.source import block_seconds, is_small
 from chladni.signals.errors import LogError
@@ -36,6 +37,14 @@ def moving_channels(series: TimeSeries) -> list[str]:
     lowest = np.fmin.reduce(series.values, axis=1, initial=np.inf)
     highest = np.fmax.reduce(series.values, axis=1, initial=-np.inf)
     return [one.name for one, low, high in zip(series.channels, lowest, highest, strict=True) if low < high]
+
+
+def still_note(still: Sequence[str]) -> tuple[str, ...]:
+    """Say that channels that were asked for never change; nothing where all do."""
+    if not still:
+        return ()
+    verb = "never changes" if len(still) == 1 else "never change"
+    return (f"{some_of(list(still))} {verb}: zeros are for want of motion, as of a sensor that isn't connected",)
 
 
 class Watched:

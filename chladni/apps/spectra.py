@@ -8,7 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chladni.apps.excitation import excitation_names, stored_functions
-from chladni.apps.sources import Progress, Span, Watched, moving_channels, no_progress, on_one_grid, watched_grids
+from chladni.apps.sources import (
+    Progress,
+    Span,
+    Watched,
+    moving_channels,
+    no_progress,
+    on_one_grid,
+    still_note,
+    watched_grids,
+)
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.io.source import SeriesLike, are_numbers, driven_series, log_or_series
@@ -282,6 +291,8 @@ def transfer(
         spectra = replace(spectra, provenance=spectra.provenance.with_notes(*grid.notes))
         _require_moving(grid, references)
         spectra = without_constant(spectra, grid, keep=(*references, *(named or ())))
+        still = [name for name in grid.constant() if name in (named or ())]
+        spectra = replace(spectra, provenance=spectra.provenance.with_notes(*still_note(still)))
         return frequency_response(
             spectra, references=references, responses=named, estimator=estimator, hammer_range=hammer_range
         )
@@ -336,9 +347,15 @@ def zoomed(log: Log, *, channels: Sequence[str] | None, span: Span, **options: A
         kept = [moving_channels(one) for one in groups]
         groups = tuple(one.select(names) for one, names in zip(groups, kept, strict=True) if names) or groups
     try:
-        return tuple(zoom_spectrum(one, **options) for one in groups)
+        return tuple(_told_still(zoom_spectrum(one, **options), one) for one in groups)
     except EstimateError as error:
         raise EstimateError(f"{log.path.name}: {error}") from error
+
+
+def _told_still(found: AmplitudeSpectrum, series: TimeSeries) -> AmplitudeSpectrum:
+    moving = moving_channels(series)
+    note = still_note([channel.name for channel in series.channels if channel.name not in moving])
+    return replace(found, provenance=found.provenance.with_notes(*note))
 
 
 def _told_excitations(source: Log | TimeSeries, span: Span) -> tuple[str, ...]:

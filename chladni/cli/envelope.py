@@ -7,13 +7,13 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.words import number, with_error
+from chladni.cli.words import NOTHING, number, with_error
 from chladni.signals.errors import SetupError
 from chladni.signals.text_reading import real_number
 
 if TYPE_CHECKING:
     from chladni.apps.envelope import LogEnvelopes
-    from chladni.signals.envelope import Bearing, EnvelopeSpectrum
+    from chladni.signals.envelope import Bearing, EnvelopeSpectrum, FaultLine
 
 MOST_PEAKS = 5
 BEARING_FORM = "elements=N,ball=MM,pitch=MM,angle=DEG"
@@ -115,6 +115,12 @@ def _print_bands(out: Output, found: "LogEnvelopes") -> None:
     )
 
 
+def _stands_out(found: "EnvelopeSpectrum", fault: "FaultLine") -> bool:
+    """Whether the scatter of the lines doesn't explain a line: it's a peak by name."""
+    spacing_hz = float(found.frequency_hz[1])
+    return any(abs(peak.frequency_hz - fault.found_hz) <= spacing_hz for peak in found.peaks)
+
+
 def _print_faults(out: Output, found: "EnvelopeSpectrum") -> None:
     if not found.faults:
         return
@@ -125,7 +131,7 @@ def _print_faults(out: Output, found: "EnvelopeSpectrum") -> None:
             [
                 fault.name,
                 number(fault.expected_hz, digits=5),
-                number(fault.found_hz, digits=5),
+                number(fault.found_hz, digits=5) if _stands_out(found, fault) else NOTHING,
                 number(fault.over_background, digits=3),
             ]
             for fault in found.faults

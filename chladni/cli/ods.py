@@ -7,7 +7,7 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.words import number, unit, with_error
+from chladni.cli.words import angle, number, unit, with_error
 
 if TYPE_CHECKING:
     from chladni.signals.deflection_shapes import DeflectionShapes
@@ -70,7 +70,7 @@ def _print_shapes(out: Output, found: "DeflectionShapes") -> None:
                     channel.name,
                     with_error(float(abs(found.values[row, column])), float(found.std[row, column])),
                     unit(channel.unit),
-                    f"{np.angle(found.values[row, column], deg=True):.0f}",
+                    angle(float(np.angle(found.values[row, column], deg=True))),
                     number(float(found.coherence[row, column]), digits=3),
                 ]
                 for column, channel in enumerate(found.channels)

@@ -5,6 +5,9 @@ from math import isfinite
 from chladni.signals.wording import with_sigma
 
 NOTHING = "-"
+PLAIN_BELOW = 1e7
+# Zero has no sign that anybody measured.
+ZERO = {"-0": "0"}
 
 
 def number(value: float | None, *, digits: int = 4) -> str:
@@ -12,12 +15,27 @@ def number(value: float | None, *, digits: int = 4) -> str:
 
     Examples
     --------
-    >>> number(0.00012345), number(None), number(1700.0)
-    ('0.0001234', '-', '1700')
+    >>> number(0.00012345), number(None), number(1700.0), number(12800.0), number(-0.0)
+    ('0.0001234', '-', '1700', '12800', '0')
     """
     if value is None or not isfinite(value):
         return NOTHING
-    return f"{value:.{digits}g}"
+    told = f"{value:.{digits}g}"
+    if "e+" in told and abs(value) < PLAIN_BELOW:
+        # An exponent is harder to read than a few more digits.
+        told = f"{value:.0f}"
+    return ZERO.get(told, told)
+
+
+def angle(degrees: float) -> str:
+    """Give an angle to whole degrees.
+
+    Examples
+    --------
+    >>> angle(-0.3), angle(89.6)
+    ('0', '90')
+    """
+    return number(round(degrees), digits=3)
 
 
 def fixed(value: float, *, places: int) -> str:

@@ -248,13 +248,20 @@ class McapLog(Log):
         known = [lag for lag in lags if lag is not None]
         bounded = len(known) == len(lags)
         earliest, latest = min((low for low, _ in known), default=0), max((high for _, high in known), default=0)
+        told = f"between {start_s or 0.0} s and {'its end' if end_s is None else f'{end_s} s'}"
         return Window(
             start_ns=start_ns,
             end_ns=end_ns,
             log_start_ns=None if start_ns is None or not bounded else max(0, start_ns + earliest - LATENESS_NS),
             log_end_ns=None if end_ns is None or not bounded else max(0, end_ns + latest + LATENESS_NS),
-            told=f"between {start_s or 0.0} s and {'its end' if end_s is None else f'{end_s} s'}",
+            told=told + self._ends(start_s),
         )
+
+    def _ends(self, start_s: float | None) -> str:
+        """Say where the log ends, for a window that begins behind it."""
+        logged = self._container.time_range_ns
+        end_s = None if logged is None else (logged[1] - self.start_time_ns) / NS_PER_S
+        return f" (the log ends at {end_s:.6g} s)" if start_s and end_s is not None and start_s > end_s else ""
 
     def _time_ns(self, time_s: float | None) -> int | None:
         if time_s is None:

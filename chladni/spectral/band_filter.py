@@ -115,10 +115,13 @@ class BandFilter:
         """Give what is left at the end of the stream; `EstimateError` when no run was longer than twice `reach_s`."""
         yield from self._filtered()
         if self._runs.longest <= 2 * self._reach:
+            # The filter is as long as its narrower slope asks for.
+            narrow = self.band_hz[1] - self.band_hz[0] < self.band_hz[0]
+            remedy = "take a wider band" if narrow else "begin the band at a higher frequency"
             raise EstimateError(
                 f"a band from {self.band_hz[0]:g} to {self.band_hz[1]:g} Hz needs an unbroken run of "
                 f"{2 * self.reach_s:.3g} s, and the longest has {self._runs.longest / self.sample_rate_hz:.3g} s. "
-                "Measure longer, or begin the band at a higher frequency"
+                f"Measure longer, or {remedy}"
             )
 
     def _filtered(self) -> Iterator[TimeSeries]:

@@ -11,6 +11,7 @@ from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.deflection_shapes import DeflectionShapes
 from chladni.signals.errors import EstimateError
 from chladni.spectral.cross_spectra import cross_spectra
+from chladni.spectral.leakage import named_window
 from chladni.spectral.peaks import find_peaks
 from chladni.spectral.power_spectral_density import power_spectral_density
 
@@ -36,7 +37,8 @@ def deflection_shapes(
     references
         Name of the channel whose phase is 0; one that moves at every frequency asked for.
     frequencies_hz
-        Where; the nearest line is taken. None takes the named peaks of all channels.
+        Where; the nearest line is taken, and what its window takes from a tone between two lines is made up for,
+        with half of that in the error bar. None takes the named peaks of all channels.
     resolution_hz, channels, sample_rate_hz, start_s, end_s
         Of samples: how they are averaged, see `cross_spectra`.
 
@@ -77,7 +79,7 @@ def deflection_shapes(
             end_s=end_s,
         )
     row = spectra.index(references)
-    lines = _lines(spectra, frequencies_hz)
+    lines, wanted_hz = _lines(spectra, frequencies_hz)
     own = spectra.density[row, row, lines].real
     if np.any(own <= 0):
         still = float(spectra.frequency_hz[lines[int(np.argmin(own))]])
@@ -87,10 +89,14 @@ def deflection_shapes(
     coherence = np.divide(np.abs(cross) ** 2, own[:, None] * auto, out=np.zeros(auto.shape), where=auto > 0)
     coherence = np.minimum(coherence, 1.0)
     values = cross * np.sqrt(spectra.bandwidth_hz / own)[:, None]
+    gain = _tone_gain(spectra, row, lines, wanted_hz)[:, None]
+    values = values * gain
+    # Half of what was corrected is the frequency's to be wrong.
+    std = np.hypot(_std(spectra, lines, values, coherence), np.abs(values) * (1 - 1 / gain) / 2)
     return DeflectionShapes(
         frequency_hz=spectra.frequency_hz[lines],
         values=values,
-        std=_std(spectra, lines, values, coherence),
+        std=std,
         coherence=coherence,
         channels=spectra.channels,
         reference=spectra.channels[row].name,
@@ -109,7 +115,8 @@ def _std(spectra: CrossSpectra, lines: Index, values: Complex, coherence: Real) 
     return np.asarray(np.abs(values) * spread)
 
 
-def _lines(spectra: CrossSpectra, frequencies_hz: Sequence[float] | None) -> Index:
+def _lines(spectra: CrossSpectra, frequencies_hz: Sequence[float] | None) -> tuple[Index, Real]:
+    """Give the lines nearest to what is asked for, and for each the frequency that was meant."""
     axis = spectra.frequency_hz
     if frequencies_hz is None:
         wanted = np.array(sorted(peak.frequency_hz for peak in find_peaks(power_spectral_density(spectra))))
@@ -121,10 +128,38 @@ def _lines(spectra: CrossSpectra, frequencies_hz: Sequence[float] | None) -> Ind
     if outside.size or not wanted.size:
         told = f"{outside[0]:g} Hz lies outside" if outside.size else "no frequency is named; name some of"
         raise EstimateError(f"{told} the spectrum, {axis[0]:g} to {axis[-1]:g} Hz")
-    lines = np.unique([int(np.argmin(np.abs(axis - one))) for one in wanted])
+    lines, first = np.unique([int(np.argmin(np.abs(axis - one))) for one in wanted], return_index=True)
     if axis[lines[0]] == 0:
         # The mean is taken off: the line at 0 Hz holds no motion.
         raise EstimateError(
             f"{wanted.min():g} Hz lies nearer to 0 than to the first line, {axis[1]:.4g} Hz; ask for finer lines"
         )
-    return lines
+    return lines, wanted[first]
+
+
+def _tone_gain(spectra: CrossSpectra, row: int, lines: Index, wanted_hz: Real) -> Real:
+    """Give what the window takes from a tone between two lines, as a factor 1 or above for each line.
+
+    The auto-spectrum of the reference on a line and its neighbours is a tone at the frequency that was meant, as the
+    window spreads it, on a floor. A floor alone, as a broad resonance is, loses nothing.
+    """
+    account, gain = spectra.provenance, np.ones(lines.size)
+    # Whole periods have their tones on lines, and hits have none.
+    if account.averaging in ("periodic", "impact") or not account.segment_s:
+        return gain
+    shape = named_window(account.window)
+    own = spectra.density[row, row].real
+    for place, (line, hz) in enumerate(zip(lines.tolist(), wanted_hz.tolist(), strict=True)):
+        if 0 < line < own.size - 1:
+            offset = (hz - float(spectra.frequency_hz[line])) * account.segment_s
+            here, beside = _leaked(shape, offset), (_leaked(shape, offset - 1) + _leaked(shape, offset + 1)) / 2
+            around = (own[line - 1] + own[line + 1]) / 2
+            tone = min(max(0.0, (own[line] - around) / (here - beside)), own[line] / here)
+            gain[place] = np.sqrt((tone + own[line] - tone * here) / own[line])
+    return gain
+
+
+def _leaked(shape: Real, bins: float) -> float:
+    """Power that a tone so many lines away leaves on a line, over that of a tone on it."""
+    turns = np.exp(-2j * np.pi * bins * np.arange(shape.size) / shape.size)
+    return float(np.abs(shape @ turns / shape.sum()) ** 2)

@@ -288,6 +288,11 @@ def octave_resolution_hz(
     """
     _require_fraction(fraction)
     if low_hz is not None:
+        if not 0 < low_hz < sample_rate_hz / 2:
+            raise EstimateError(
+                f"bands can't begin at {low_hz:g} Hz: take more than 0 and less than half the sample rate, "
+                f"{sample_rate_hz / 2:g} Hz"
+            )
         return min(low_hz * _relative_width(fraction) / LINES_OF_A_BAND, sample_rate_hz / 4)
     resolution_hz = SEGMENTS / duration_s
     begins_hz = lowest_band_hz(resolution_hz, fraction=fraction)

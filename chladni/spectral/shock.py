@@ -195,8 +195,9 @@ def _lines(
     else:
         lines_hz = np.atleast_1d(np.asarray(frequencies_hz, dtype=np.float64))
     if not (lines_hz.size and np.all(np.diff(lines_hz, prepend=0.0) > 0) and lines_hz[-1] <= nyquist_hz):
+        asked = "" if band_hz is None else f", and {band_hz[0]:g} to {band_hz[1]:g} Hz were asked for"
         raise EstimateError(
-            f"natural frequencies must rise, above 0 and up to half the sample rate, {nyquist_hz:g} Hz"
+            f"natural frequencies must rise, above 0 and up to half the sample rate, {nyquist_hz:g} Hz{asked}"
         )
     return lines_hz
 

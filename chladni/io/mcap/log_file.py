@@ -3,10 +3,13 @@
 import os
 import stat
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 from chladni.io.mcap.records import MAGIC
 from chladni.signals.errors import LogError
+from chladni.signals.visible import visible
+from chladni.signals.wording import near_words
 
 _WINDOW_BYTES = 4 * 1024
 # What people open by mistake, by the first bytes, and what helps.
@@ -56,7 +59,7 @@ class LogFile:
                 raise LogError(f"{path}: not a file; expected an MCAP log")
             self._file = path.open("rb", buffering=0)
         except OSError as error:
-            raise LogError(f"{path}: can't be opened: {error.strerror or error}") from error
+            raise LogError(f"{path}: can't be opened: {error.strerror or error}{_beside(path)}") from error
         self.size = os.fstat(self._file.fileno()).st_size
         self._lock = threading.Lock()
         try:
@@ -152,3 +155,13 @@ class Window:
         """Return a few bytes like `read` and keep what was read ahead."""
         view = self.view_if_loaded(offset, size)
         return self._file.read(offset, size) if view is None else bytes(view)
+
+
+def _beside(path: Path) -> str:
+    """Name the file of a folder that a missing one may be a slip of; else ask for the path."""
+    if path.exists():
+        return ""
+    with suppress(OSError):
+        if near := near_words(path.name, sorted(one.name for one in path.parent.iterdir())):
+            return f"; did you mean {visible(str(path.with_name(near[0])))}?"
+    return "; give the path of a log"

@@ -12,6 +12,9 @@ from chladni.viewers.labels import short_names
 from chladni.viewers.style import ON_LIGHT
 
 HEIGHT_IN = 1.3
+# A delay in the middle of its half, and no fewer samples than show the shape of the peak.
+AROUND_A_DELAY = 4.0
+FEWEST_STEPS = 60
 A_SHEET = 6
 POINTS = 4000
 
@@ -36,10 +39,18 @@ def _figures(found: CrossCorrelation, delay_s: np.ndarray) -> dict[str, Figure]:
                 draw_correlation(axes, found, row, float(delay_s[row]))
                 axes.set_title(plain(labels[found.responses[row].name]), loc="left", pad=2)
             stack[-1].set_xlabel(plain(f"Lag after {labels[found.reference.name]} [s]"))
-            stack[-1].set_xlim(found.lag_s[0], found.lag_s[-1])
+            stack[-1].set_xlim(*_shown_lags(found, delay_s[list(rows)]))
             figure.supylabel("Correlation coefficient", fontsize=8.5)
             figures[f"correlation{page}"] = figure
     return figures
+
+
+def _shown_lags(found: CrossCorrelation, delay_s: np.ndarray) -> tuple[float, float]:
+    """Give the lags around 0 and the delays, so that a delay of milliseconds is seen in a correlation of seconds."""
+    known = np.abs(delay_s[np.isfinite(delay_s)])
+    step_s = float(found.lag_s[1] - found.lag_s[0])
+    reach_s = max(AROUND_A_DELAY * float(known.max()), FEWEST_STEPS * step_s) if known.size else np.inf
+    return max(float(found.lag_s[0]), -reach_s), min(float(found.lag_s[-1]), reach_s)
 
 
 def draw_correlation(axes: Axes, found: CrossCorrelation, row: int, delay_s: float) -> None:
