@@ -99,14 +99,14 @@ def _print_peaks(out: Output, found: "UnitPeaks") -> None:
     at_most = f", {MOST_PEAKS} at most" if len(found.peaks) == MOST_PEAKS else ""
     out.channel_table(
         f"Peaks{where}, the highest first{at_most}{judged}",
-        ["strongest in", "seen in", "frequency [Hz]", "density", "unit"],
+        ["strongest in", "frequency [Hz]", "density", "unit", "seen in"],
         [
             [
                 peak.channels[0],
-                counted(len(peak.channels), "channel"),
                 with_error(peak.frequency_hz, peak.frequency_std_hz),
                 with_error(peak.height, peak.height_std),
                 unit(peak.unit),
+                counted(len(peak.channels), "channel"),
             ]
             for peak in found.peaks
         ],
