@@ -55,7 +55,7 @@ def piped(path: Path) -> StandardInput:
 
 
 def served(path: Path) -> FoxgloveServer:
-    """Serve the messages of a log by the SDK's own server, with their stamps, at four times their speed."""
+    """Serve the messages of a log by the SDK's own server, with their stamps, at twice their speed."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -70,7 +70,7 @@ def served(path: Path) -> FoxgloveServer:
             channels[channel.id] = foxglove.Channel(
                 channel.topic, schema=described, message_encoding=channel.message_encoding, context=context
             )
-    source = FoxgloveServer(f"ws://127.0.0.1:{port}", patience_s=6.0)
+    source = FoxgloveServer(f"ws://127.0.0.1:{port}", patience_s=8.0)
     time.sleep(1.0)
 
     holding = [context]
@@ -80,8 +80,9 @@ def served(path: Path) -> FoxgloveServer:
         for number, (_, channel, message) in enumerate(messages):
             channels[channel.id].log(message.data, log_time=message.log_time)
             if number % 500 == 0:
-                time.sleep(max(0.0, begun_s + (message.log_time - start_ns) / 4e9 - time.monotonic()))
-        time.sleep(10.0)
+                time.sleep(max(0.0, begun_s + (message.log_time - start_ns) / 2e9 - time.monotonic()))
+        # Whoever listens may be late.
+        source._closed.wait(120.0)  # noqa: SLF001
         server.stop()
         # The context closes its channels when nobody holds it.
         del holding[:]

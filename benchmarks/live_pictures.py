@@ -12,10 +12,13 @@ import sys
 import tempfile
 import threading
 import time
+from io import BytesIO
 from pathlib import Path
 from uuid import uuid4
 
 import rerun_cli
+from mcap.reader import make_reader
+from mcap.writer import Writer
 from rerun.experimental import ViewerClient
 
 from chladni.apps.demo_log import make_demo_log
@@ -27,6 +30,24 @@ from chladni.viewers.rerun.live_targets import live_recording
 EVERY_S = 5.0
 # The log is written in its own time, and lasts so long.
 LOG_S = 60.0
+
+
+def in_small_chunks(path: Path) -> bytes:
+    """Give the log as a recorder writes it that lets others follow: a chunk a fraction of a second."""
+    held = BytesIO()
+    writer = Writer(held, chunk_size=1 << 14)
+    writer.start()
+    ids: dict[int, int] = {}
+    with path.open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            if channel.id not in ids:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                ids[channel.id] = writer.register_channel(
+                    channel.topic, channel.message_encoding, number, dict(channel.metadata)
+                )
+            writer.add_message(ids[channel.id], message.log_time, message.data, message.publish_time)
+    writer.finish()
+    return held.getvalue()
 
 
 def record(content: bytes, path: Path) -> None:
@@ -80,7 +101,7 @@ def play(options: argparse.Namespace, port: int) -> int:
         write_mcap(make_demo_log().series, Path(folder) / "whole.mcap", layout="batches", block_s=0.1)
         path = Path(folder) / "arm.mcap"
         path.touch()
-        content = (Path(folder) / "whole.mcap").read_bytes()
+        content = in_small_chunks(Path(folder) / "whole.mcap")
         threading.Thread(target=record, args=(content, path), daemon=True).start()
         for state in live(path, resolution_hz=0.5, patience_s=5.0):
             if drawing.draw(state):

@@ -13,6 +13,7 @@ from chladni.io.live.growing_grid import GrowingGrid
 from chladni.io.live.held_messages import HeldMessages
 from chladni.io.live.reception import MessageSource, Samples, Told
 from chladni.io.live.stream_places import StreamPlaces, joined_pieces
+from chladni.io.log_info import some_of
 from chladni.io.mcap.message_batch import MessageBatch
 from chladni.io.placement import Placement, StatedRate
 from chladni.io.setup import Setup
@@ -248,6 +249,11 @@ class LiveLog:
             if "." not in one.topic and one.topic in catalog.refused
         ]
         streams = catalog.streams(sources)
+        if self._wanted is None and (empty := _without_numbers(held, streams)):
+            # Fields of a message type that nobody measures; averages need numbers of all channels at once.
+            sources = [one for one in sources if one.channel.name not in empty]
+            streams = catalog.streams(sources)
+            told.append(Told(kind="topic", text=f"channels that hold no number are left out: {some_of(empty)}"))
         told += self._begin_streams(held, streams, sources, first=first, ended=ended)
         # No channel of the others is asked for, or can be read.
         for number in chosen - {one for stream in streams for one in stream.topic.decoders}:
@@ -374,6 +380,17 @@ class LiveLog:
             f"{self.name}: it ended and no channel had uniform samples; 'chladni info LOG' tells what a finished log "
             "holds"
         )
+
+
+def _without_numbers(held: HeldMessages, streams: Sequence[Stream]) -> list[str]:
+    """Names of the channels of which messages came, and not a single number."""
+    reader = PieceReader(streams)
+    seen: dict[str, bool] = {}
+    for number, piece in reader.pieces(held.batches(reader.channel_ids)):
+        for channel, row in zip(streams[number].channels, piece.values, strict=True):
+            if row.size:
+                seen[channel.name] = seen.get(channel.name, False) or bool(np.isfinite(row).any())
+    return [name for name, known in seen.items() if not known]
 
 
 def _of_beginning(placement: Placement) -> list[Told]:

@@ -9,6 +9,7 @@ from chladni.io.live.followed_log import FollowedFile
 from chladni.io.log import open_log
 from chladni.signals.errors import LogError
 from tests.io.live.growing import IMU_CHANNELS, START_NS, Bits, joined, read_live, write_imus
+from tests.make_logs import IMU, LogMaker, imu
 
 STAMPS = START_NS + np.arange(3000) * 2_000_000
 CHANNELS = list(IMU_CHANNELS)
@@ -159,3 +160,17 @@ def test_messages_that_are_sent_again_are_told_and_not_taken_in_silence(tmp_path
     blocks, told = live_of(path)
     np.testing.assert_array_equal(joined(blocks), finished(path))
     assert "clock" in {one.kind for one in told}
+
+
+def test_fields_that_nobody_measures_stop_no_average(tmp_path: Path) -> None:
+    """A message type has fields of which a sensor fills some, and NaN stands in the others."""
+    path = tmp_path / "a.mcap"
+    with LogMaker(path) as maker:
+        channel = maker.ros2("/imu", "sensor_msgs/msg/Imu", IMU)
+        for number, stamp_ns in enumerate(STAMPS.tolist()):
+            maker.write(channel, imu(stamp_ns, (number % 7, np.nan, 1.0), (0.0, 0.0, number % 3)), stamp_ns)
+    blocks, told = read_live(Bits(path.read_bytes()))
+    names = [one.name for one in blocks[0].channels]
+    assert "/imu.linear_acceleration.x" in names
+    assert "/imu.linear_acceleration.y" not in names
+    assert ["/imu.linear_acceleration.y" in one.text for one in told] == [True]
