@@ -197,7 +197,7 @@ def _settings() -> "Iterator[None]":
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Let Dask's own words on lost workers and closed lines go nowhere: what is lost is told in ours."""
-    # Not by its level: that of the parent decides whether a worker that was ended is started again.
+    # Handlers and not levels: an ended worker was seen to come back later, or not, where levels were raised.
     before: dict[str, tuple[list[logging.Handler], bool]] = {}
     for name in _LOGGERS:
         logger = logging.getLogger(name)
