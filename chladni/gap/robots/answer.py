@@ -251,7 +251,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
     rest = contest.fit([*best.terms[:place], *best.terms[place + 1 :]], best)
     # A law that holds this one as a special case, and needs no more of it, says the same.
     found = alternatives(contest, best, place, _OTHERS)
-    others = [found[0], *(one for one in found[1:] if not one.terms[-1].holds(term) or one.nats > best.nats)]
+    others = [found[0], *(one for one in found[1:] if not one.terms[-1].holds(term) or _needs_more(one))]
     # What is unknown elsewhere is so with the term, too.
     free = [float(np.sum(np.maximum(contest.unknowns(one), 0.0))) for one in (rest, best)]
     unknown = rest.nats + free[0] - free[1]
@@ -286,6 +286,11 @@ def _weighed(solved: Solved, place: int) -> Weighed:
         nats=best.nats - max(rest.nats, unknown),
         gain=best.nats - rest.nats,
     )
+
+
+def _needs_more(fit: Fit) -> bool:
+    """Whether the last number of the last law is told, without which it'd be a simpler one."""
+    return bool(_told(fit, len(fit.terms) - 1)[-1])
 
 
 def _told(best: Fit, place: int) -> Mask:

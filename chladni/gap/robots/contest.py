@@ -348,10 +348,19 @@ class Contest:
             found = [min(least, one.over_noise) for least, one in zip(found, more.left, strict=True)]
         return np.array(found)
 
+    def weighed_as(self, fit: Fit, weight: Real) -> Fit:
+        """Give the numbers of the same set with its rows weighed so; what it leaves and its evidence stay."""
+        chosen = self._chosen(fit.terms)
+        gram, right = self._moments(chosen)
+        curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
+        numbers = _bounded(curvature, weight @ right, self._least[chosen])
+        covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
+        return replace(fit, numbers=numbers, covariance=covariance, weight=weight)
+
     def promise(self, fit: Fit, weight: Real | None = None) -> list[tuple[float, Term]]:
         """Give what each further term would bring at about, nats, with the rows weighed as in a fit."""
         if weight is None:
-            weight = np.array([one.weight for one in fit.left])
+            weight = fit.weight
         chosen = self._chosen(fit.terms)
         gram, rest = np.zeros((self._size, chosen.size)), np.zeros(self._size)
         for row in np.flatnonzero(weight):

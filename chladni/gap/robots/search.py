@@ -1,12 +1,14 @@
 """The search for what a robot's description lacks: terms are added, exchanged and dropped while that pays."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from itertools import islice
+from collections.abc import Callable, Collection, Iterable, Sequence
+from functools import partial
 
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.term import Term
 
+#: Nats that a term would bring at about, and the term.
+Promise = tuple[float, Term]
 #: Terms that are fitted in full of those that promise most.
 _FITTED = 8
 #: The same in place of another.
@@ -39,9 +41,9 @@ def searched(
 def _more(contest: Contest, best: Fit) -> list[Fit]:
     """Fit the set with one more of the terms that promise most; or with a word at every joint."""
     taken = {term.key for term in best.terms}
-    others = [term for _, term in contest.promise(best) if term.key not in taken]
-    found = [contest.fit([*best.terms, term], best) for term in others[:_FITTED]]
-    found += [contest.fit([*best.terms, *shared], best) for shared in _shared(others)]
+    promised = _free(taken, contest.promise(best))
+    found = [contest.fit([*best.terms, term], best) for _, term in _each(promised)[:_FITTED]]
+    found += [contest.fit([*best.terms, *shared], best) for shared in _shared([term for _, term in promised])]
     if _best(found).nats > best.nats + _WORTH:
         return found
     # Where a description has too much of one thing and too little of another, either alone makes it worse.
@@ -51,12 +53,19 @@ def _more(contest: Contest, best: Fit) -> list[Fit]:
 def _beside(contest: Contest, one: Fit) -> list[Fit]:
     """Fit a second term at the place of the last one."""
     last = one.terms[-1]
+    taken = {other.key for other in one.terms}
     near = [
-        term
-        for _, term in contest.promise(one)
-        if term.key not in {other.key for other in one.terms} and set(term.rows) & set(last.rows)
+        term for _, term in _each(contest.promise(one)) if term.key not in taken and set(term.rows) & set(last.rows)
     ]
     return [contest.fit([*one.terms, term], one) for term in near[:_EXCHANGED]]
+
+
+def _each(promised: Iterable[Promise]) -> list[Promise]:
+    """Give of each law the form alone that promises most, and what it promises."""
+    found: dict[tuple[str, str, str | None], Promise] = {}
+    for nats, term in promised:
+        found.setdefault((*term.key, term.variant), (nats, term))
+    return list(found.values())
 
 
 def _shared(others: Sequence[Term]) -> Iterable[list[Term]]:
@@ -93,6 +102,20 @@ def _tidied(contest: Contest, best: Fit, rows: frozenset[int] | None = None) -> 
         best = better
 
 
+def _in_place(
+    contest: Contest, rest: Fit, best: Fit, count: int, wanted: Callable[[Sequence[Promise]], Iterable[Promise]]
+) -> list[Term]:
+    """Give what promises most in place of terms of the best set, beside the rest of it.
+
+    Where much is left, all that takes most of it looks alike: so both as the rest is weighed, and as the best set.
+    """
+    found = {}
+    for each in (rest, contest.weighed_as(rest, best.weight)):
+        near = _each(wanted(contest.promise(each)))[:count]
+        found.update({id(term): term for _, term in near})
+    return list(found.values())
+
+
 def _merged(contest: Contest, best: Fit, tried: Sequence[int]) -> list[Fit]:
     """Fit one term in place of all that stand at a site: two idealisations may be one other law."""
     found = []
@@ -100,8 +123,8 @@ def _merged(contest: Contest, best: Fit, tried: Sequence[int]) -> list[Fit]:
     for site, count in Counter(term.site for term in best.terms).items():
         if count > 1 and site in sites:
             rest = contest.fit([term for term in best.terms if term.site != site], best)
-            near = [term for _, term in contest.promise(rest) if term.site == site]
-            found += [contest.fit([*rest.terms, term], rest) for term in near[:_EXCHANGED]]
+            near = _in_place(contest, rest, best, _EXCHANGED, partial(_at, frozenset({site})))
+            found += [contest.fit([*rest.terms, term], rest) for term in near]
     return found
 
 
@@ -115,14 +138,14 @@ def _exchanged(contest: Contest, best: Fit, tried: Sequence[int]) -> list[Fit]:
         sites = {term.site for term in best.terms if (term.word, term.rare) == kind}
         rest = contest.fit([term for term in best.terms if (term.word, term.rare) != kind], best)
         taken = {term.key for term in rest.terms}
-        others = [one for one in contest.promise(rest) if one[1].key not in taken]
-        alike: dict[tuple[str, str | None, int], list[tuple[float, Term]]] = {}
-        for nats, term in others:
-            if term.site in sites and term.word != kind[0]:
+        others = _in_place(contest, rest, best, _EXCHANGED, partial(_free, taken))
+        alike: dict[tuple[str, str | None, int], list[Promise]] = {}
+        for nats, term in _at(sites, _free(taken, contest.promise(rest))):
+            if term.word != kind[0]:
                 alike.setdefault(term.kind, []).append((nats, term))
         families = [one for one in alike.values() if len(one) == len(sites)]
         families.sort(key=lambda one: -sum(nats for nats, _ in one))
-        found += [rest, *(contest.fit([*rest.terms, term], best) for _, term in others[:_EXCHANGED])]
+        found += [rest, *(contest.fit([*rest.terms, term], best) for term in others)]
         found += [contest.fit([*rest.terms, *(term for _, term in one)], best) for one in families[:_EXCHANGED]]
     return found
 
@@ -140,14 +163,21 @@ def alternatives(contest: Contest, best: Fit, place: int, count: int, behind: fl
     rest = [*best.terms[:place], *best.terms[place + 1 :]]
     taken, own = {one.key for one in rest}, best.terms[place]
     without = contest.fit(rest, best)
-    promised = contest.promise(without)
-    least = next(nats for nats, term in promised if term is own) - behind
-    # Of each word the form that promises most.
-    others: dict[tuple[str, str], Term] = {}
-    for nats, term in promised:
-        if term.key not in taken and term is not own and nats > least:
-            others.setdefault(term.key, term)
-    return [without, *(contest.fit([*rest, term], best) for term in islice(others.values(), count))]
+
+    def near(promised: Sequence[Promise]) -> list[Promise]:
+        least = next(nats for nats, term in promised if term is own) - behind
+        return [(nats, term) for nats, term in _free(taken, promised) if term is not own and nats > least]
+
+    others = _in_place(contest, without, best, count, near)
+    return [without, *(contest.fit([*rest, term], best) for term in others)]
+
+
+def _at(sites: Collection[str], promised: Iterable[Promise]) -> list[Promise]:
+    return [one for one in promised if one[1].site in sites]
+
+
+def _free(taken: Collection[tuple[str, str]], promised: Iterable[Promise]) -> list[Promise]:
+    return [one for one in promised if one[1].key not in taken]
 
 
 def _best(fits: Sequence[Fit]) -> Fit:
