@@ -25,11 +25,8 @@ def loaded(word: str, site: str, values: dict[str, float], outputs: tuple[str, .
     return with_outputs(measured((chladni.attached(word, site, values),), noise=0.003), outputs)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("word", "site", "values", "outputs"),
-    [LOADS[0], *(pytest.param(*one, marks=pytest.mark.nightly) for one in LOADS[1:])],
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize(("word", "site", "values", "outputs"), LOADS)
 def test_a_heavy_load_is_found_where_the_screen_loses_it(
     word: str, site: str, values: dict[str, float], outputs: tuple[str, ...]
 ) -> None:

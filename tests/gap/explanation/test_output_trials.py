@@ -12,7 +12,7 @@ from chladni.gap.plant.tunable import Tunables
 from tests.gap.made_log import WORDS, band_noise, measured, three_bodies
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_range_whose_end_is_round_is_told_though_the_floor_took_it_for_noise():
     model = three_bodies()
     log, floor = measured(model, band_noise(4000), outputs=[0, 2], noise=0.005)

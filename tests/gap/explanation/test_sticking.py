@@ -14,10 +14,8 @@ def unlike_the_model():
     return chain([2.1, 2.5, 3.0], [4.9e5, 6.2e5, 4e5], [40.0, 70.0, 50.0], at=2)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "force", [*(pytest.param(force, marks=pytest.mark.nightly) for force in (30.0, 400.0)), 100.0]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("force", [30.0, 100.0, 400.0])
 def test_sliding_force_is_found_however_much_of_it_sticks(force: float) -> None:
     values = {"force": force, "presliding": 2e-8}
     rubbing = unlike_the_model().with_effects(

@@ -65,7 +65,7 @@ def test_a_body_that_is_heavier_than_its_tolerance_carries_something() -> None:
     assert all("b1.mass" not in found_wrong(tunables, one.start_z) for one in wrong_values(location, tunables))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_slip_hides_a_force_elsewhere_until_it_is_told_beside_it() -> None:
     spring = attached("hardening_stiffness", "j2", {"cubic": 2e12})
     location, tunables = located({"j0.stiffness": 4.0}, spring)

@@ -60,7 +60,7 @@ def test_with_one_sensor_every_place_stays_open() -> None:
     assert found.shares == {}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_place_that_short_stretches_cannot_tell_is_found_on_the_record() -> None:
     # Two sensors on five bodies: the states at the start of each short stretch could print all that a force does.
     model = chain([2.0, 2.5, 3.0, 1.0, 1.5], [5e5, 6e5, 4e5, 3e5, 4e5], [20.0, 30.0, 20.0, 20.0, 20.0], at=2)

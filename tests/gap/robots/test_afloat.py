@@ -34,6 +34,7 @@ def named(found: Diagnosis) -> set[tuple[str, str]]:
     return {(one.effect, one.site) for one in found.causes}
 
 
+@pytest.mark.nightly
 def test_filters_of_an_imu_are_no_cause(tmp_path: Path) -> None:
     robot, late = biped(tmp_path), 1
     log = hung(robot, walking(SECONDS))
@@ -51,7 +52,7 @@ def test_filters_of_an_imu_are_no_cause(tmp_path: Path) -> None:
     assert left.std() < 0.1 * (torques.missing - right).std()
 
 
-@pytest.mark.parametrize("falls", [False, True])
+@pytest.mark.parametrize("falls", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_a_robot_that_is_right_lacks_nothing(tmp_path: Path, falls: bool) -> None:
     found = found_of(tmp_path, falls=falls)
     assert (found.verdict, found.causes) == ("none", ())
@@ -66,6 +67,7 @@ def test_friction_in_a_leg_is_named_with_its_size(tmp_path: Path) -> None:
     assert found.gap.after < 0.5 * found.gap.before
 
 
+@pytest.mark.nightly
 def test_friction_is_named_where_the_log_has_commands_and_efforts(tmp_path: Path) -> None:
     log = hung(biped(tmp_path, "machine/biped.xml", left=' frictionloss="0.4"'), walking(SECONDS), effort=True)
     found = diagnose_robot(biped(tmp_path), log)

@@ -57,6 +57,7 @@ def test_where_noise_is_far_below_the_law_error_all_bands_count_alike() -> None:
     assert gain.max() / gain.min() < 1.01
 
 
+@pytest.mark.nightly
 def test_a_faint_drift_does_not_turn_a_fit_toward_the_corners_of_a_law() -> None:
     """Friction of another law than the fitted one: what is left must be what white noise would have left."""
     model = chain([1.0], [4e4], [8.0])

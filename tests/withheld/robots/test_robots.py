@@ -111,6 +111,7 @@ def test_an_afloat_case_has_its_imu_in_its_files():
     assert case.effects[0].severity_tuned > 3.0
 
 
+@pytest.mark.nightly
 def test_a_robot_afloat_that_is_right_is_a_whole_truth(tmp_path):
     assert make_cases(tmp_path, count=1, seed=2, generator="robots", kinds=["afloat_none=1"]) == 1
     (case,) = case_folders(tmp_path)
