@@ -251,7 +251,14 @@ def _weighed(solved: Solved, place: int) -> Weighed:
     rest = contest.fit([*best.terms[:place], *best.terms[place + 1 :]], best)
     # A law that holds this one as a special case, and needs no more of it, says the same.
     found = alternatives(contest, best, place, _OTHERS)
-    others = [found[0], *(one for one in found[1:] if not one.terms[-1].holds(term) or _needs_more(one))]
+    others = [
+        found[0],
+        *(
+            one
+            for one in found[1:]
+            if not one.terms[-1].holds(term) or (_needs_more(one) and one.nats > best.nats - TEMPER)
+        ),
+    ]
     # What is unknown elsewhere is so with the term, too.
     free = [float(np.sum(np.maximum(contest.unknowns(one), 0.0))) for one in (rest, best)]
     unknown = rest.nats + free[0] - free[1]
