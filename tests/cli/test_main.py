@@ -82,7 +82,7 @@ def test_a_traceback_is_shown_when_asked_for(run, monkeypatch):
     outcome = run("info", "not-there.mcap")
     assert outcome.code == UNUSABLE
     assert "Traceback (most recent call last)" in outcome.err
-    assert outcome.err.endswith("No such file or directory\n")
+    assert outcome.err.endswith("No such file or directory; give the path of a log\n")
 
 
 def test_interrupting_gives_130_and_leaves_nothing_behind(run, arm_log, tmp_path, monkeypatch):

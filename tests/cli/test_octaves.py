@@ -59,7 +59,7 @@ def test_a_large_log_is_averaged_block_by_block(run, log, monkeypatch):
     ("arguments", "words"),
     [
         (["--low", "0.01"], "needs segments of"),
-        (["--low", "-1"], "resolution"),
+        (["--low", "-1"], "bands can't begin at -1 Hz"),
         (["--low", "3900"], "no 1/3 octave band lies between"),
         (["--fraction", "0"], "--fraction"),
         (["--weighting", "B"], "'B' is not one of"),

@@ -113,8 +113,8 @@ def test_levels_and_bands_are_tables_of_their_channels():
     found = chladni.levels(both, bands_hz=[(20.0, 60.0), (60.0, 200.0)])
     frame = found.to_pandas()
     assert list(frame.index) == ["f", "a"]
-    assert frame.columns[0] == "20 to 60 Hz"
-    np.testing.assert_array_equal(frame["60 to 200 Hz"], found.rms[:, 1])
+    assert frame.columns[0] == "20 to 60 Hz rms"
+    np.testing.assert_array_equal(frame["60 to 200 Hz rms"], found.rms[:, 1])
     np.testing.assert_array_equal(frame["60 to 200 Hz kurtosis"], found.kurtosis[:, 1])
     running = found.running.to_pandas()
     assert running.attrs["units"]["a / 20 to 60 Hz"] == "m/s^2"

@@ -184,6 +184,9 @@ def _settings() -> "Iterator[None]":
         {
             # A log that ends its worker is tried apart from those beside it, sooner.
             "distributed.scheduler.allowed-failures": 1,
+            # A worker that ended is started again by its nanny. Dask's cluster would end the nanny for good when that
+            # takes longer than 15 s, as it does on a busy machine.
+            "distributed.deploy.lost-worker-timeout": "1h",
             "distributed.comm.timeouts.connect": f"{CONNECT_S:g}s",
             "distributed.admin.tick.limit": "1h",
             "distributed.diagnostics.nvml": False,
@@ -197,7 +200,6 @@ def _settings() -> "Iterator[None]":
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Let Dask's own words on lost workers and closed lines go nowhere: what is lost is told in ours."""
-    # Handlers and not levels: an ended worker was seen to come back later, or not, where levels were raised.
     before: dict[str, tuple[list[logging.Handler], bool]] = {}
     for name in _LOGGERS:
         logger = logging.getLogger(name)

@@ -4,7 +4,9 @@ import json
 from typing import Any
 
 from bokeh.core.types import ID
+from bokeh.document import Document
 from bokeh.embed import json_item
+from bokeh.io.doc import patch_curdoc
 from matplotlib.figure import Figure
 
 from chladni.viewers.figures.album import Album
@@ -33,7 +35,10 @@ class PlotItems:
         except UntranslatableError:
             return None
         self.count += 1
-        item: dict[str, Any] = dict(json_item(made.grid, ID(f"plot-{self.count}")))
+        # Bokeh asks the current document for its callbacks; one that a server ended has none.
+        own = Document()
+        with patch_curdoc(own):
+            item: dict[str, Any] = dict(json_item(made.grid, ID(f"plot-{self.count}")))
         _Renamed(f"p{self.count}-").rename(item)
         # Inside a script nothing may look like its end.
         text = json.dumps(item, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")

@@ -236,7 +236,7 @@ def test_references_are_channels_by_name():
     found = method.identify(record)
     np.testing.assert_allclose(found.frequency_hz, TRUTH.frequency_hz, rtol=0.01)
     assert found.shapes.shape == (5, 5)
-    with pytest.raises(EstimateError, match=r"no reference '/wing'; did you mean /mass0\.z"):
+    with pytest.raises(EstimateError, match=r"no reference '/wing'; there are: /mass0\.z"):
         CovarianceDrivenSubspace(references=["/wing"]).identify(record)
 
 

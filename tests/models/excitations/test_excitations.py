@@ -158,5 +158,5 @@ def test_a_gap_in_a_recorded_signal_is_told_with_its_time() -> None:
 
 
 def test_a_channel_that_is_not_recorded_is_named() -> None:
-    with pytest.raises(EstimateError, match="no channel 'x'"):
-        Recorded(series=series(np.zeros(10)), channel="x").samples(8, RATE_HZ, rng())
+    with pytest.raises(EstimateError, match="no channel 'nowhere'"):
+        Recorded(series=series(np.zeros(10)), channel="nowhere").samples(8, RATE_HZ, rng())
