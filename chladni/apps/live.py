@@ -253,12 +253,13 @@ class _Session:
 
     def _take(self, got: Samples) -> tuple[TimeSeries, ...]:
         taken = []
+        # What is told with the first samples has its time from their start on, too.
+        if self._start_ns is None and got.blocks:
+            self._start_ns = got.blocks[0].start_time_ns
         for told in got.told:
             self._tell(told.kind, told.text, told.time_ns, told.samples)
         residuals = [one for one in map(self._residual, got.blocks) if one is not None]
         for block in (*got.blocks, *residuals):
-            if self._start_ns is None:
-                self._start_ns = block.start_time_ns
             try:
                 self._average(block)
             except EstimateError as error:

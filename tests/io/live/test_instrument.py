@@ -9,6 +9,7 @@ import pytest
 from chladni.apps.live import live
 from chladni.apps.spectra import psd
 from chladni.io.live.instrument import Instrument, LiveInstrument, Taken
+from chladni.io.live.reception import Samples
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
@@ -62,8 +63,15 @@ def test_averages_are_those_of_the_samples_that_were_taken() -> None:
     assert instrument.stopped
 
 
-def test_samples_that_the_instrument_lost_are_a_gap() -> None:
-    blocks = cut(4000)
+@pytest.mark.parametrize("late_s", [0.0, 0.2], ids=["one by one", "all at once"])
+def test_samples_that_the_instrument_lost_are_a_gap(late_s: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    blocks, receive = cut(4000), LiveInstrument.receive
+
+    def later(self: LiveInstrument, timeout_s: float) -> Samples:
+        time.sleep(late_s)
+        return receive(self, timeout_s)
+
+    monkeypatch.setattr(LiveInstrument, "receive", later)
     states = list(live(Made(blocks[:8] + blocks[10:]), resolution_hz=2.0, modes_every_s=0))
     gaps = [event for state in states for event in state.events if event.kind == "gap"]
     assert [event.samples for event in gaps] == [512]
