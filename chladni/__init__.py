@@ -158,6 +158,8 @@ _HOME = {
     "VibrationResponse": "chladni.signals.random_vibration",
     "Rotation": "chladni.signals.rotation",
     "ShockResponse": "chladni.signals.shock_response",
+    "SineCheck": "chladni.signals.sine_vibration",
+    "SineProfile": "chladni.signals.sine_vibration",
     "StabilisationDiagram": "chladni.signals.stabilisation_diagram",
     "Study": "chladni.signals.study",
     "TimeSeries": "chladni.signals.time_series",
@@ -200,6 +202,9 @@ _HOME = {
     "rotation": "chladni.spectral.rotation",
     "severity": "chladni.spectral.severity",
     "srs": "chladni.spectral.shock",
+    "check_sine": "chladni.spectral.sine_vibration",
+    "sine_limits": "chladni.spectral.sine_vibration",
+    "sine_profile": "chladni.spectral.sine_vibration",
     "transmissibility": "chladni.spectral.transmissibility",
     "transmissibility_along": "chladni.spectral.transmissibility",
     "waterfall": "chladni.spectral.waterfall",
@@ -277,6 +282,8 @@ __all__ = [
     "Severity",
     "ShockResponse",
     "Simulation",
+    "SineCheck",
+    "SineProfile",
     "StabilisationDiagram",
     "StructureInput",
     "StructureModel",
@@ -304,6 +311,7 @@ __all__ = [
     "check_linearity",
     "check_profile",
     "check_reciprocity",
+    "check_sine",
     "coherence",
     "compare_levels",
     "convert_form",
@@ -376,6 +384,8 @@ __all__ = [
     "shape_transmissibility",
     "show",
     "simulate",
+    "sine_limits",
+    "sine_profile",
     "srs",
     "time_delay",
     "transmissibility",
@@ -508,6 +518,7 @@ if TYPE_CHECKING:
     from chladni.signals.random_vibration import ProbabilityDensity, ProfileCheck, RandomProfile, VibrationResponse
     from chladni.signals.rotation import Rotation
     from chladni.signals.shock_response import ShockResponse
+    from chladni.signals.sine_vibration import SineCheck, SineProfile
     from chladni.signals.stabilisation_diagram import StabilisationDiagram
     from chladni.signals.study import Study
     from chladni.signals.time_series import TimeSeries
@@ -539,6 +550,7 @@ if TYPE_CHECKING:
     from chladni.spectral.rotation import rotation
     from chladni.spectral.severity import severity
     from chladni.spectral.shock import srs
+    from chladni.spectral.sine_vibration import check_sine, sine_limits, sine_profile
     from chladni.spectral.transmissibility import transmissibility, transmissibility_along
     from chladni.spectral.waterfall import waterfall
     from chladni.spectral.zoom import zoom_spectrum

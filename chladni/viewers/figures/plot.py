@@ -30,6 +30,7 @@ from chladni.signals.order_spectra import OrderCuts, OrderMap
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.random_vibration import ProbabilityDensity, VibrationResponse
 from chladni.signals.shock_response import ShockResponse
+from chladni.signals.sine_vibration import SineCheck, SineProfile
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
@@ -51,6 +52,7 @@ from chladni.viewers.figures import (
     orders,
     random_vibration,
     shock,
+    sine_vibration,
     waterfall,
 )
 from chladni.viewers.figures.chart import chart_height_in, draw_chart
@@ -353,6 +355,18 @@ def _(value: ProbabilityDensity) -> list[Picture]:
     style = Style.of_channels(value.channels)
     draw = partial(random_vibration.draw_probability, found=value, style=style)
     return [Picture((Part(random_vibration.HEIGHT_IN, draw),), "Deviation from the mean [standard deviations]")]
+
+
+@pictures.register
+def _(value: SineProfile) -> list[Picture]:
+    draw = partial(sine_vibration.draw_sine_profile, profile=value)
+    return [Picture((Part(sine_vibration.HEIGHT_IN, draw),), "Frequency [Hz]")]
+
+
+@pictures.register
+def _(value: SineCheck) -> list[Picture]:
+    draw = partial(sine_vibration.draw_sine_check, found=value, style=Style.of_channels(value.channels))
+    return [Picture((Part(sine_vibration.HEIGHT_IN, draw),), "Frequency [Hz]")]
 
 
 @pictures.register
