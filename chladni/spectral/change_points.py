@@ -18,6 +18,8 @@ MOST_CHANGES: Final = 20
 FALSE_ALARM: Final = 0.01
 #: Steps beyond those in question, by which the likeness of neighbours is judged.
 FURTHER_STEPS: Final = 3
+#: Correlation of neighbours beyond which no number of values would count.
+MOST_ALIKE: Final = 0.95
 #: Of the probability of where a step lies.
 CREDIBLE: Final = 0.95
 #: Median of a squared standard normal number.
@@ -192,7 +194,8 @@ class _Problem:
             if place is None:
                 break
             places = sorted([*places, place])
-        return _independent_share(self._left(self.design(places)))
+        design = self.design(places)
+        return _independent_share(self._left(design), fitted=len(design))
 
     def settled(self, places: list[int]) -> list[int]:
         """Place each step anew beside the others."""
@@ -208,7 +211,7 @@ class _Problem:
         design = self.design(places)
         left = self._left(design)
         freedom = max(self.values.size - np.linalg.matrix_rank(design), 1)
-        variance = float(left @ left) / freedom / _independent_share(left)
+        variance = float(left @ left) / freedom / _independent_share(left, fitted=len(design))
         inverse = np.linalg.pinv(design @ design.T)
         fitted = inverse @ (design @ (self.values * self.roots))
         std = np.sqrt(np.maximum(np.diag(inverse), 0.0) * variance)
@@ -273,10 +276,14 @@ def _weights(values: Real, std: Real | None) -> Real:
     return np.asarray(weights / weights.mean(), dtype=np.float64)
 
 
-def _independent_share(left: Real) -> float:
-    """Share of the values that count, where neighbours of what is left are alike: (1 - r) / (1 + r), at most 1."""
-    power = float(left @ left)
-    alike = float(left[1:] @ left[:-1]) / power if power > 0 else 0.0
-    # Fitted levels make what is left of white noise look unlike its neighbours by about as much as this.
-    alike = min(max(alike, 0.0), 0.95)
+def _independent_share(left: Real, *, fitted: int) -> float:
+    """Share of the values that count, where neighbours of what is left are alike: (1 - r) / (1 + r), at most 1.
+
+    What was fitted makes what is left look less alike: of n values and p fitted columns, r comes out lower by
+    (p (1 + r) + 2 r) / n in the mean (Kendall 1954, Biometrika 41, 403, has p = 1). That is taken back.
+    """
+    power, size = float(left @ left), left.size
+    found = float(left[1:] @ left[:-1]) / power if power > 0 else 0.0
+    alike = (found + fitted / size) / max(1 - (fitted + 2) / size, 1 / size)
+    alike = min(max(alike, 0.0), MOST_ALIKE)
     return (1 - alike) / (1 + alike)
