@@ -2,14 +2,22 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 Number = Annotated[float, Field(strict=True)]
 Positive = Annotated[float, Field(strict=True, gt=0)]
 Count = Annotated[int, Field(strict=True, ge=1)]
 Text = Annotated[str, Field(min_length=1, max_length=1000)]
 Texts = Annotated[list[Text], Field(min_length=1, max_length=10_000)]
-Band = tuple[Annotated[float, Field(strict=True, ge=0)], Positive]
+
+
+def _rising(band: tuple[float, float]) -> tuple[float, float]:
+    if band[0] >= band[1]:
+        raise ValueError(f"the band from {band[0]:g} to {band[1]:g} Hz is empty; the lower end comes first")
+    return band
+
+
+Band = Annotated[tuple[Annotated[float, Field(strict=True, ge=0)], Positive], AfterValidator(_rising)]
 Flag = Annotated[bool, Field(strict=True)]
 JoinName = Literal["auto", "hold", "band-limited"]
 
@@ -36,11 +44,6 @@ class _Averaged(_Spanned):
     window: Text | None = None
     overlap: Annotated[float, Field(strict=True, ge=0, lt=1)] | None = None
     highest_hz: Positive | None = None
-
-
-def _require_band(band: Band | None) -> None:
-    if band is not None and band[0] >= band[1]:
-        raise ValueError(f"the band from {band[0]:g} to {band[1]:g} Hz is empty; the lower end comes first")
 
 
 class InfoTable(_Table):
@@ -77,7 +80,6 @@ class ModesTable(_Spanned):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        _require_band(self.band_hz)
         alone = self.operational or self.method in FROM_RESPONSES
         if self.references is not None and alone:
             what = "operational" if self.operational else f"method {self.method}"
@@ -95,12 +97,6 @@ class LevelsTable(_Spanned):
     running_s: Positive | None = None
     machine: Literal["large-rigid", "large-flexible", "medium-rigid", "medium-flexible"] | None = None
     slow: Flag = False
-
-    @model_validator(mode="after")
-    def _bands(self) -> Self:
-        for band in self.bands_hz or ():
-            _require_band(band)
-        return self
 
 
 class GapTable(_Spanned):

@@ -23,12 +23,12 @@ def test_all_mistakes_are_told_with_line_and_key(tmp_path: Path) -> None:
     with pytest.raises(SetupError) as told:
         load_recipe(path)
     lines = {int(one.removeprefix(f"{path}:").split(":")[0]): one for one in told.value.mistakes}
-    assert sorted(lines) == [2, 4, 5, 6, 9, 12]
+    assert sorted(lines) == [2, 4, 5, 6, 10, 12]
     assert "no such file" in lines[2]
     assert "resolution_hz: found -1.0; must be greater than 0" in lines[4]
     assert "did you mean channels?" in lines[5]
     assert "method plscf needs an excitation" in lines[6]
-    assert "from 50 to 5 Hz is empty" in lines[9]
+    assert "from 50 to 5 Hz is empty" in lines[10]
     assert "must be text in quotes" in lines[12]
 
 
