@@ -15,7 +15,7 @@ import json
 import os
 import secrets
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import date
@@ -179,24 +179,27 @@ class StudyFolder:
                 continue
             newest |= dict.fromkeys(logs["log"].to_pylist(), path)
             days[path] = {_day_name(day) for day in logs["day"].to_pylist()}
+        mine: dict[Path, list[str]] = {}
+        for log, path in newest.items():
+            mine.setdefault(path, []).append(log)
         touched = {day for found in days.values() for day in found}
         touched |= {day for log in newest for day in self._days.get(log, ())}
         for day in sorted(touched):
-            fresh = [path for path, found in days.items() if day in found]
-            self._rewrite_day(day, fresh, newest)
+            fresh = {path: mine.get(path, []) for path, found in days.items() if day in found}
+            self._rewrite_day(day, fresh, pa.array(list(newest), pa.string()))
 
-    def _rewrite_day(self, day: str, journals: Iterable[Path], newest: Mapping[str, Path]) -> None:
+    def _rewrite_day(self, day: str, journals: Mapping[Path, list[str]], replaced: pa.Array) -> None:
+        """Put the rows of the logs that each journal is the last to tell of in place of older ones."""
         added: dict[str, list[pa.Table]] = {name: [] for name in SCHEMAS}
-        for path in journals:
-            mine = pa.array([log for log, last in newest.items() if last == path], pa.string())
+        for path, logs in journals.items():
+            mine = pa.array(logs, pa.string())
             for name, table in unpacked(path.read_bytes(), source=str(path)).items():
                 if name in ORDER:
                     kept = pc.and_(pc.is_in(table["log"], mine), _is_day(table["day"], day))
                     added[name].append(table.filter(kept))
-            for log in mine.to_pylist():
+            for log in logs:
                 # Where it is from now on: noted only once per day that holds a row of it.
                 self._days.setdefault(log, set()).add(day)
-        replaced = pa.array(list(newest), pa.string())
         for name, tables in added.items():
             self._rewrite(name, day, tables, replaced)
 
