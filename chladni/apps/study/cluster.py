@@ -119,7 +119,7 @@ def _of_this_machine(workers: int | None, *, dashboard: bool) -> "Iterator[Clien
         raise SetupError(f"--workers {count} must be at least 1")
     with (
         TemporaryDirectory(prefix="chladni-workers-", ignore_cleanup_errors=True) as folder,
-        _quiet(),
+        quiet(),
         _settings(),
         LocalCluster(
             n_workers=count,
@@ -165,7 +165,7 @@ def _of_scheduler(scheduler: str, keys: Keys) -> "Iterator[Client]":
     if told and not encrypted:
         raise SetupError("--tls-ca, --tls-cert and --tls-key are for tls:// addresses; leave them out")
     security = Security(require_encryption=encrypted, **told)
-    with _quiet(), _settings():
+    with quiet(), _settings():
         try:
             client = Client(scheduler, security=security, timeout=CONNECT_S, set_as_default=False)
         except (OSError, TypeError, ValueError, RuntimeError) as error:
@@ -198,18 +198,20 @@ def _settings() -> "Iterator[None]":
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Let Dask's own words on lost workers and closed lines go nowhere: what is lost is told in ours."""
-    before: dict[str, tuple[list[logging.Handler], bool]] = {}
-    for name in _LOGGERS:
-        logger = logging.getLogger(name)
-        before[name] = ([*logger.handlers], logger.propagate)
-        logger.handlers, logger.propagate = [logging.NullHandler()], False
+    before: dict[logging.Logger, tuple[list[logging.Handler], bool]] = {}
+    # Dask gives some of its loggers handlers of their own: that of its root isn't all.
+    for name in [*_LOGGERS, *logging.root.manager.loggerDict]:
+        if name.partition(".")[0] in _LOGGERS:
+            logger = logging.getLogger(name)
+            before.setdefault(logger, (logger.handlers, logger.propagate))
+            logger.handlers, logger.propagate = [logging.NullHandler()], False
     try:
         yield
     finally:
-        for name, (handlers, propagate) in before.items():
-            logging.getLogger(name).handlers, logging.getLogger(name).propagate = handlers, propagate
+        for logger, (handlers, propagate) in before.items():
+            logger.handlers, logger.propagate = handlers, propagate
 
 
 def cores() -> int:

@@ -4,10 +4,11 @@ import queue
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from itertools import islice
 from statistics import median
-from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
+from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 from chladni.signals.errors import SetupError
 
@@ -162,29 +163,23 @@ class Engine(Generic[Item]):
         if entry is None:
             return None
         _, batch = entry
-        if future.status == "finished":
-            content = self._result(future)
-            if content is not None:
-                return Answer(items=batch.items, content=content)
-        return self._lost(batch, future)
-
-    def _result(self, future: "Future") -> bytes | None:
-        from distributed import TimeoutError as TooLate
+        if future.status != "finished":
+            return self._lost(batch, future)
+        from distributed.scheduler import KilledWorker
 
         try:
-            content: Any = future.result(timeout=PATIENCE_S)
-        except (OSError, TooLate, ValueError):
-            # The worker that held the answer went with it.
-            return None
-        return bytes(content)
+            content: bytes = future.result(timeout=PATIENCE_S)
+        except (OSError, ValueError, CancelledError, KilledWorker) as error:
+            # The worker that held the answer went with it, and perhaps the one that was to compute it again.
+            return self._lost(batch, future, error)
+        return Answer(items=batch.items, content=content)
 
-    def _lost(self, batch: _Batch[Item], future: "Future") -> Answer[Item] | None:
+    def _lost(self, batch: _Batch[Item], future: "Future", error: Exception | None = None) -> Answer[Item] | None:
         if future.status == "cancelled" or future.cancelled():
             self._again.append(batch)
             # A scheduler that comes back has forgotten all.
             time.sleep(_LOOK_EVERY_S)
             return None
-        error = self._error(future)
         if len(batch.items) > 1:
             # One of them is to blame, and the others aren't.
             self._again.extend(_Batch((item,), batch.losses) for item in batch.items)
@@ -193,14 +188,15 @@ class Engine(Generic[Item]):
         if batch.losses < MOST_LOSSES:
             self._again.append(batch)
             return None
-        return Answer(items=batch.items, reason=error)
+        return Answer(items=batch.items, reason=self._reason(future, error))
 
-    def _error(self, future: "Future") -> str:
+    def _reason(self, future: "Future", error: Exception | None) -> str:
         from distributed.scheduler import KilledWorker
 
         try:
-            error = future.exception(timeout=PATIENCE_S)
-        except Exception as unknown:  # noqa: BLE001  # whatever a remote error turns into, it's an answer
+            error = error or future.exception(timeout=PATIENCE_S)
+        except (OSError, RuntimeError) as unknown:
+            # The scheduler doesn't answer, or the client has been closed.
             error = unknown
         if isinstance(error, KilledWorker):
             return "its worker was ended each time, as happens where memory is short; try it on a larger machine"
