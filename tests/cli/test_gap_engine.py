@@ -1,12 +1,19 @@
 """``chladni gap`` from files to answer, the diagnosis itself included."""
 
+import json
+from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import chladni
+from chladni.apps.study.study import run_study
 from chladni.io.mcap.writer import write_mcap
+from chladni.io.study.recipe import load_recipe
 from chladni.models.effects.catalogue import CATALOGUE
 from tests import made_diagnosis as made
 from tests.cli.conftest import Outcome, Run
@@ -31,8 +38,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return made.write_arm_model(folder), folder / "arm.mcap"
 
 
-def diagnosed(run: Run, files: tuple[Path, Path], json: object, *more: object) -> Outcome:
-    outcome = run("gap", *files, *WITHOUT, "--json", json, *more)
+def diagnosed(run: Run, files: tuple[Path, Path], target: object, *more: object) -> Outcome:
+    outcome = run("gap", *files, *WITHOUT, "--json", target, *more)
     assert outcome.code == 0, outcome.err
     return outcome
 
@@ -55,14 +62,32 @@ def test_a_sensor_that_shows_too_much_is_named_and_the_model_written_with_it(
     assert (again["verdict"], again["causes"]) == ("none", [])
 
 
-def test_the_same_files_give_the_same_document_to_the_byte(
+def test_a_study_gives_the_document_of_the_command_to_the_byte(
     run: Run, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    written = [tmp_path / "first.json", tmp_path / "second.json"]
-    for path in written:
-        diagnosed(run, files, path, "--seed", 3)
-    assert written[0].read_bytes() == written[1].read_bytes()
-    assert b'"gain_error"' in written[0].read_bytes()
+    distributed, _ = pytest.importorskip("distributed"), pytest.importorskip("duckdb")
+    model, log = files
+    single = tmp_path / "single.json"
+    diagnosed(run, files, single, "--seed", 3)
+    recipe = tmp_path / "recipe.toml"
+    leave_out = [word for word in sorted(CATALOGUE) if word != "gain_error"]
+    recipe.write_text(
+        f'format = "chladni.study/1"\ndocuments = true\n[gap]\nmodel = "{model}"\nseed = 3\nleave_out = {leave_out}\n'
+    )
+    quiet: dict[str, Any] = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
+    with distributed.Client(n_workers=1, threads_per_worker=1, processes=False, **quiet) as client:
+        told = run_study(load_recipe(recipe), [str(log)], tmp_path / "out", connect=partial(nullcontext, client))
+    assert (told.done, told.failures) == (1, [])
+    found = chladni.results(tmp_path / "out")
+    [row] = found.table("documents").to_pylist()
+    assert row["document"] == single.read_text()
+    document = json.loads(row["document"])
+    [gap], [cause] = found.table("gaps").to_pylist(), found.table("causes").to_pylist()
+    assert (gap["verdict"], gap["closed"]) == ("effect", document["gap"]["closed"])
+    assert (cause["effect"], cause["site"], cause["share"]) == (
+        "gain_error", "acc_wrist", document["causes"][0]["share"]
+    )  # fmt: skip
+    assert json.loads(cause["parameters"]) == document["causes"][0]["parameters"]
 
 
 def test_channels_at_different_rates_are_refused_with_what_to_do(
