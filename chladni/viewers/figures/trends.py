@@ -53,6 +53,7 @@ def _figure(trends: Sequence[Trend]) -> Figure:
             panes[-1].xaxis.set_major_formatter(dates.ConciseDateFormatter(locator))
         else:
             panes[-1].set_xlabel("log")
+            panes[-1].xaxis.get_major_locator().set_params(integer=True)
         return figure
 
 
