@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 
 #: Exit code where something left its band.
 OUTSIDE = 3
-# As many as one reads.
-MOST_CHANGES = 30
+# As many as one reads; the tables hold all.
+MOST_CHANGES, MOST_FAILURES = 30, 30
+ALL_FAILURES = "select log, step, reason from failures"
+ALL_DAMAGE = "select log, sentence from findings join logs using (log) where damage > 0"
 
 Recipe = Annotated[
     Path,
@@ -106,9 +108,9 @@ def study(
     from chladni.apps.study.limits import judge
     from chladni.apps.study.study import run_study
     from chladni.apps.study.trends import follow
-    from chladni.io.study.logs import find_logs
     from chladni.io.study.recipe import load_recipe
     from chladni.io.study.results import results
+    from chladni.signals.errors import EstimateError
 
     require_places(reads=[recipe], writes={"--json": json, "--html": report, "--save": save}, folders={"--out": out})
     to = Output(json)
@@ -117,7 +119,7 @@ def study(
         _connected, to, workers, scheduler, Keys(authority=tls_ca, certificate=tls_cert, key=tls_key), dashboard
     )
     with to.progress(recipe.name) as progress:
-        ran = run_study(loaded, find_logs(logs), out, connect=connect, progress=progress)
+        ran = run_study(loaded, logs, out, connect=connect, progress=progress)
     _print(to, out, ran)
     followed = follow(results(out), loaded.file.trend)
     before = None if earlier is None else follow(earlier, loaded.file.trend)
@@ -125,6 +127,8 @@ def study(
     _print_trends(to, followed, verdict)
     _write(to, out, followed, verdict, report=report, save=save)
     _send(to, ran, followed, verdict)
+    if not followed.logs:
+        raise EstimateError(f"{out}: no log was read; see why above, or in the table of failures")
     if verdict.outside:
         raise typer.Exit(OUTSIDE)
 
@@ -146,13 +150,18 @@ def _print(to: Output, out: Path, report: "StudyReport") -> None:
 
     before = report.there + report.unchanged
     there = f"; {count(before)} were done already" if before else ""
-    to.line(f"{counted(report.done, 'log')} done{there}: {out}")
+    unread = f", {count(report.unread)} of them couldn't be read" if report.unread else ""
+    to.line(f"{counted(report.done, 'log')} done{unread}{there}: {out}")
     if report.failures:
-        to.table(
-            f"{counted(len(report.failures), 'failure')}; the other steps and logs are done",
-            ["log", "step", "reason"],
-            [[Path(log).name, step, reason] for log, step, reason in sorted(report.failures)],
-        )
+        to.line(f"{counted(len(report.failures), 'failure')}; the other steps and logs are done", style="bold")
+        told = [f"{Path(log).name}, {step}: {reason}" for log, step, reason in sorted(report.failures)]
+        to.lines(told[:MOST_FAILURES])
+        if len(told) > MOST_FAILURES:
+            to.line(f'all of them: chladni query {out} "{ALL_FAILURES}"')
+    if report.damaged:
+        # What is left of a log that was cut has rows like any other.
+        to.line(f"{counted(report.damaged, 'log')} with damage, whose rows are of what is whole:")
+        to.line(f'what is lost: chladni query {out} "{ALL_DAMAGE}"')
     to.line(f"ask for rows: chladni query {out} SQL; tables are {', '.join(SCHEMAS)}")
 
 
@@ -196,8 +205,7 @@ def _write(
     from chladni.apps.study.trends import trend_sentences
 
     changes = trend_sentences(followed.trends)
-    logs = len({log for one in followed.trends for log in one.logs})
-    title = f"{out.name}: {counted(logs, 'log')}"
+    title = f"{out.name}: {counted(followed.logs, 'log')}"
     if report is not None:
         from chladni.viewers.report.trends import TrendPage, write_trend_report
 
@@ -228,7 +236,8 @@ def _send(to: Output, ran: "StudyReport", followed: "Trends", verdict: "Verdict"
     to.json(
         {
             "format": "chladni.study-run/1", "logs": ran.logs, "there": ran.there, "done": ran.done,
-            "unchanged": ran.unchanged, "seconds": ran.seconds, "cpu_s": ran.cpu_s,
+            "unread": ran.unread, "damaged": ran.damaged, "unchanged": ran.unchanged,
+            "seconds": ran.seconds, "cpu_s": ran.cpu_s,
             "failures": [{"log": log, "step": step, "reason": why} for log, step, why in ran.failures],
             "followed": trends_document(followed),
             "outside": outside, "checked": verdict.checked, "missing": list(verdict.missing),

@@ -33,6 +33,10 @@ class StudyReport:
         Whose rows were made now.
     unchanged
         That were read, and found to be what was done already.
+    unread
+        Of those done, that couldn't be read at all.
+    damaged
+        Of those done, in which something is lost or damaged.
     failures
         ``(log, step, reason)`` of what went wrong now.
     seconds, cpu_s
@@ -43,6 +47,8 @@ class StudyReport:
     there: int
     done: int = 0
     unchanged: int = 0
+    unread: int = 0
+    damaged: int = 0
     failures: list[tuple[str, str, str]] = field(default_factory=list)
     seconds: float = 0.0
     cpu_s: float = 0.0
@@ -50,7 +56,7 @@ class StudyReport:
 
 def run_study(
     recipe: Recipe,
-    logs: Sequence[str] | Sequence[LogAddress],
+    logs: Sequence[str],
     out: Path | str,
     *,
     connect: Connect,
@@ -63,7 +69,7 @@ def run_study(
     recipe
         From `chladni.io.study.recipe.load_recipe`.
     logs
-        Files, folders and addresses, see `chladni.io.study.logs.find_logs`, or what that found.
+        Files, folders and addresses, see `chladni.io.study.logs.find_logs`.
     out
         Folder of the results; made, or gone on with.
     connect
@@ -78,8 +84,7 @@ def run_study(
     LogError
         When the folder can't be written to. What is done stays.
     """
-    found = [one if isinstance(one, LogAddress) else None for one in logs]
-    addresses = find_logs([str(one) for one in logs]) if None in found else tuple(one for one in found if one)
+    addresses = find_logs(logs)
     text = recipe.to_json()
     with opened_folder(Path(out), recipe.identity, text) as folder:
         waiting = [one for one in addresses if not _is_done(folder, one)]
@@ -131,7 +136,10 @@ def _note(engine: Engine[Task], report: StudyReport, tables: dict[str, list[dict
         report.seconds += one["seconds"]
         report.cpu_s += one["cpu_s"]
         report.unchanged += bool(one["unchanged"])
-    report.done += len(tables.get("logs", ()))
+    for one in tables.get("logs", ()):
+        report.done += 1
+        report.unread += one["status"] == "failed"
+        report.damaged += bool(one["damage"])
     report.failures += [(one["log"], one["step"], one["reason"]) for one in tables.get("failures", ())]
 
 

@@ -10,10 +10,9 @@ from chladni.apps.documents import Document, finite, plain
 from chladni.io.study.results import StudyResults
 from chladni.modal.shapes.mode_comparison import cheapest_pairs
 from chladni.modal.shapes.mode_tracks import ModeTrack, SeenModes, follow_modes
-from chladni.signals.errors import EstimateError
 from chladni.signals.trend import CovariateEffect, Trend, TrendKind
-from chladni.signals.wording import with_sigma
-from chladni.spectral.change_points import find_steps
+from chladni.signals.wording import counted, with_sigma
+from chladni.spectral.change_points import LEAST_IN_SEGMENT, find_steps
 
 if TYPE_CHECKING:
     from chladni.io.study.recipe_file import TrendTable
@@ -23,6 +22,8 @@ TRENDS_FORMAT: Final = "chladni.trends/1"
 #: Of the logs that have modes, lines or causes at all: what is seen more rarely is no trend.
 LEAST_SHARE: Final = 0.2
 LEAST_LOGS: Final = 3
+#: Changes aren't looked for in fewer: a level on each side takes some.
+LEAST_TO_CHANGE: Final = 2 * LEAST_IN_SEGMENT
 #: Lines of a channel that are followed: the highest of each log.
 MOST_LINES: Final = 5
 #: By what share of its frequency a line may move from log to log.
@@ -39,11 +40,14 @@ class Trends:
     ----------
     trends
         Modes first, then damping, levels, lines, causes.
+    logs
+        Number of logs that were read.
     notes
         What couldn't be followed, and why, in sentences.
     """
 
     trends: tuple[Trend, ...]
+    logs: int
     notes: tuple[str, ...] = ()
 
 
@@ -68,15 +72,8 @@ def follow(found: StudyResults, asked: "TrendTable") -> Trends:
         The study.
     asked
         Table ``[trend]`` of its recipe: covariates, and how modes are matched.
-
-    Raises
-    ------
-    EstimateError
-        When no log was read.
     """
     logs = _in_time(found)
-    if not logs:
-        raise EstimateError(f"{found.path}: no log was read, so there is nothing to follow")
     number = {row["log"]: place for place, row in enumerate(logs)}
     covariates, notes = _covariates(found, asked.covariates, number)
     points = [
@@ -86,7 +83,12 @@ def follow(found: StudyResults, asked: "TrendTable") -> Trends:
         *_causes(found, number),
     ]
     trends = [_trend(one, logs, covariates) for one in points]
-    return Trends(trends=tuple(trends), notes=tuple(notes))
+    short = sum(len(one.logs) < LEAST_TO_CHANGE for one in trends)
+    if short:
+        notes.append(
+            f"{counted(short, 'trend')} of fewer than {LEAST_TO_CHANGE} logs: too few to tell a change from scatter"
+        )
+    return Trends(trends=tuple(trends), logs=len(logs), notes=tuple(notes))
 
 
 def _in_time(found: StudyResults) -> list[Row]:

@@ -1,5 +1,6 @@
 """What a worker does: a batch of logs, each by all steps of the recipe, to the bytes of their tables."""
 
+import re
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -13,6 +14,7 @@ from typing import Any, Final
 from chladni import __version__
 from chladni.apps.study.rows import Rows, rows_of
 from chladni.apps.study.steps import DOCUMENTS
+from chladni.io.files.formats import fitting_options
 from chladni.io.log import Log, open_log
 from chladni.io.setup import Setup, load_setup
 from chladni.io.study.logs import HeldLog, LogAddress, StoreError, held
@@ -25,6 +27,15 @@ from chladni.signals.visible import document_text
 _NS_PER_S: Final = 1_000_000_000
 #: A clock that was never set begins at the Unix epoch.
 _FIRST_DAY_NS: Final = 366 * 86_400 * _NS_PER_S
+#: An option that a message advises; those of a whole command that it gives stay as they are.
+_OPTION: Final = re.compile(r"chladni [a-z]+ [^;]*|--[a-z][a-z-]*")
+_KEYS: Final = {
+    "--setup": "setup", "--rate": "[open] sample_rate_hz", "--time": "[open] time", "--time-unit": "[open] time_unit",
+    "--stamp": "[open] stamp", "--unit": "[open] units", "--channel": "channels", "--reference": "references",
+    "--response": "responses", "--resolution": "resolution_hz", "--start": "start_s", "--end": "end_s",
+    "--join": "join", "--operational": "operational = true", "--state": "state", "--command": "command",
+    "--without": "leave_out",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,20 +93,17 @@ class _Prepared:
             self.model = self._loaded(recipe.model)
 
     def told(self, text: str) -> str:
-        """Give a message with files called as the user calls them."""
+        """Give a message with files called as the user calls them, and keys of the recipe in place of options."""
+        text = _OPTION.sub(lambda found: _KEYS.get(found[0], found[0]), text)
         for one in (self.recipe.setup, self.recipe.model):
             if one is not None:
                 text = text.replace(str(self._path(one)), one.path)
         return text
 
     def open(self, path: Path) -> Log:
-        """Open a log as the recipe says."""
-        said = self.recipe.file.open
-        told: dict[str, Any] = said.model_dump(exclude_none=True)
-        # Data files have no stamps to choose from, and say so when asked.
-        if said.stamp == "auto":
-            del told["stamp"]
-        return open_log(path, setup=self.setup, **told)
+        """Open a log as the recipe says; of its keys, those that are for this kind of file."""
+        told: dict[str, Any] = self.recipe.file.open.model_dump(exclude_none=True)
+        return open_log(path, setup=self.setup, **fitting_options(path, told))
 
     def _path(self, attached: Attached) -> Path:
         return Path(self._folder.name) / Path(attached.path).name

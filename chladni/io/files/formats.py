@@ -144,6 +144,13 @@ def read_file(path: Path | str, *, kind: str | None = None, **options: Any) -> F
     return contents
 
 
+def fitting_options(path: Path, options: dict[str, Any]) -> dict[str, Any]:
+    """Of options of `chladni.open` for files of many kinds, give those that this one's reader takes."""
+    kind = file_kind(path)
+    takes = ("stamp", "sample_rate_hz") if kind == MCAP else signature(reader_of(f"a{kind}")).parameters
+    return {name: value for name, value in options.items() if name in takes}
+
+
 def call_with_options(function: Callable[..., Any], first: object, options: dict[str, Any]) -> Any:
     """Call a reader or writer, with an option it doesn't have turned into one line."""
     # Options come from the command line by name: a wrong one is an input error, not a defect of chladni.

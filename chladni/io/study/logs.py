@@ -13,7 +13,7 @@ from typing import Any, BinaryIO, Final
 
 from chladni.io.files.formats import FILE_SUFFIXES, MCAP
 from chladni.io.regular_file import open_regular
-from chladni.signals.errors import LogError, SetupError
+from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.visible import visible
 
 _PIECE_BYTES: Final = 1 << 22
@@ -133,15 +133,14 @@ def _stamp(status: os.stat_result) -> str:
 
 def _in_store(word: str) -> list[LogAddress]:
     system, path = _store(word)
-    try:
-        if not any(mark in path for mark in "*?["):
-            details = [system.info(path)] if not system.isdir(path) else _below(system, path)
-        else:
-            details = [one for one in system.glob(path, detail=True).values() if one.get("type") == "file"]
-    except FileNotFoundError:
-        raise SetupError(f"{word}: no such log; look for it in its store") from None
-    except Exception as error:
-        raise _unreachable(word, error) from error
+    with _from_store(word, "listed"):
+        try:
+            if not any(mark in path for mark in "*?["):
+                details = [system.info(path)] if not system.isdir(path) else _below(system, path)
+            else:
+                details = [one for one in system.glob(path, detail=True).values() if one.get("type") == "file"]
+        except FileNotFoundError:
+            raise SetupError(f"{word}: no such log; look for it in its store") from None
     if not details:
         raise SetupError(f"{word}: holds no log; those that are read end with {MCAP}, {', '.join(FILE_SUFFIXES)}")
     return [_remote(word, one) for one in details]
@@ -179,9 +178,18 @@ def _store(url: str) -> tuple[Any, str]:
     return system, str(path)
 
 
-def _unreachable(url: str, error: Exception) -> StoreError:
-    why = " ".join(str(error).split()) or type(error).__name__
-    return StoreError(f"{visible(url)}: can't be reached: {why:.300}; the next run tries again")
+@contextmanager
+def _from_store(url: str, done: str) -> Iterator[None]:
+    """Make a `StoreError` of whatever a store's library raises: those of s3, gcs and http share no base."""
+    try:
+        yield
+    except ChladniError:
+        raise
+    except Exception as error:
+        why = " ".join(str(error).split())
+        kind = "" if isinstance(error, OSError) and why else f"{type(error).__name__}: "
+        told = f"{kind}{why:.300}".removesuffix(": ")
+        raise StoreError(f"{visible(url)}: can't be {done}: {told}; the next run tries again") from error
 
 
 @contextmanager
@@ -214,11 +222,8 @@ def _fetched(address: LogAddress, folder: Path) -> HeldLog:
     # The name is kept: messages tell it, and its end tells the kind.
     path = folder / (PurePosixPath(inside.rstrip("/")).name.partition("?")[0] or "log.mcap")
     copy = _Copy(target=path)
-    try:
+    with _from_store(address.url, "fetched"):
         copy.run_unless_stalled(lambda: system.open(inside, "rb"))
-    except Exception as error:
-        # Stores raise whatever their libraries do; a log that can't be fetched is told, and tried again.
-        raise _unreachable(address.url, error) from error
     return HeldLog(path=path, content=copy.digest.hexdigest(), size_bytes=copy.size)
 
 
@@ -247,7 +252,7 @@ class _Copy:
             try:
                 with opening() as source:
                     self.run(source)
-            except BaseException as error:  # noqa: BLE001  # it's raised where it's waited for
+            except BaseException as error:  # noqa: BLE001  # raised below: half a log would pass for a whole one
                 self._error = error
 
         # Not waited for when this process ends: what hangs may hang for ever.

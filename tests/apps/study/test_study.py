@@ -4,7 +4,7 @@ import os
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -80,6 +80,7 @@ def found(client: Any, logs: Path, recipe: Path, tmp_path_factory: pytest.TempPa
     out = tmp_path_factory.mktemp("study") / "out"
     report = run_study(load_recipe(recipe), [str(logs)], out, connect=partial(nullcontext, client))
     assert (report.logs, report.done, report.there) == (5, 5, 0)
+    assert (report.unread, report.damaged) == (1, 1)
     return chladni.results(out)
 
 
@@ -129,6 +130,28 @@ def test_a_bad_log_is_a_row_with_its_reason(found: "chladni.StudyResults", logs:
     [row] = rows(found, "failures", logs / "words.csv")
     assert (row["step"], row["kind"]) == ("open", "log")
     assert "words.csv" in row["reason"]
+
+
+def test_what_opens_data_files_leaves_other_logs_alone_and_advice_names_keys(
+    client: Any, logs: Path, tmp_path: Path
+) -> None:
+    folder, recipe = tmp_path / "logs", tmp_path / "recipe.toml"
+    folder.mkdir()
+    shutil.copy(logs / "run0.mcap", folder)
+    (folder / "table.csv").write_text("clock,x\n" + "".join(f"{n / 100:g},{n % 7}\n" for n in range(500)))
+    recipe.write_text('format = "chladni.study/1"\n[info]\n')
+    first = run_study(load_recipe(recipe), [str(folder)], tmp_path / "first", connect=partial(nullcontext, client))
+    [(_, step, reason)] = first.failures
+    assert step == "open"
+    assert "[open] time" in reason
+    assert "--" not in reason
+    assert (first.done, first.unread, first.damaged) == (2, 1, 0)
+    recipe.write_text('format = "chladni.study/1"\n[open]\ntime = "clock"\ntime_unit = "s"\n[info]\n')
+    assert not run_study(
+        load_recipe(recipe), [str(folder)], tmp_path / "second", connect=partial(nullcontext, client)
+    ).failures
+    rates = {row["rate_hz"] for row in chladni.results(tmp_path / "second").table("channels").to_pylist()}
+    assert {round(rate) for rate in rates} == {100, 400}
 
 
 def test_tables_are_parted_by_day(found: "chladni.StudyResults") -> None:
@@ -215,9 +238,9 @@ def test_logs_come_out_of_any_store(client: Any, recipe: Path, logs: Path, tmp_p
     store = fsspec.filesystem("memory")
     store.pipe("/bridge/run1.mcap", (logs / "run1.mcap").read_bytes())
     store.pipe("/bridge/read.me", b"no log")
-    addresses = find_logs(["memory://bridge/*.mcap", "memory://bridge"])
-    assert [one.url for one in addresses] == ["memory://bridge/run1.mcap"]
-    run_study(load_recipe(recipe), addresses, tmp_path / "out", connect=partial(nullcontext, client))
+    words = ["memory://bridge/*.mcap", "memory://bridge"]
+    assert [one.url for one in find_logs(words)] == ["memory://bridge/run1.mcap"]
+    run_study(load_recipe(recipe), words, tmp_path / "out", connect=partial(nullcontext, client))
     stored = chladni.results(tmp_path / "out")
     run_study(load_recipe(recipe), [str(logs / "run1.mcap")], tmp_path / "disk", connect=partial(nullcontext, client))
     disk = chladni.results(tmp_path / "disk")
@@ -229,12 +252,18 @@ def test_a_store_that_is_gone_is_a_row_and_tried_again(client: Any, recipe: Path
     fsspec = pytest.importorskip("fsspec")
     store = fsspec.filesystem("memory")
     store.pipe("/fleet/run1.mcap", (logs / "run1.mcap").read_bytes())
-    addresses = find_logs(["memory://fleet/run1.mcap"])
-    store.rm("/fleet/run1.mcap")
-    first = run_study(load_recipe(recipe), addresses, tmp_path / "out", connect=partial(nullcontext, client))
-    assert [(step, "can't be reached" in why) for _, step, why in first.failures] == [("read", True)]
+    words = ["memory://fleet/run1.mcap"]
+
+    @contextmanager
+    def too_late() -> Iterator[Any]:
+        # Workers are asked for when the logs have been listed.
+        store.rm("/fleet/run1.mcap")
+        yield client
+
+    first = run_study(load_recipe(recipe), words, tmp_path / "out", connect=too_late)
+    assert [(step, "can't be fetched" in why) for _, step, why in first.failures] == [("read", True)]
     store.pipe("/fleet/run1.mcap", (logs / "run1.mcap").read_bytes())
-    second = run_study(load_recipe(recipe), addresses, tmp_path / "out", connect=partial(nullcontext, client))
+    second = run_study(load_recipe(recipe), words, tmp_path / "out", connect=partial(nullcontext, client))
     assert (second.done, second.failures) == (1, [])
     assert not len(chladni.results(tmp_path / "out").table("failures"))
 
