@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from chladni.signals.trend import Trend, TrendKind
 from chladni.viewers.figures.sheet import look, paint, plain, sheet
@@ -53,7 +54,7 @@ def _figure(trends: Sequence[Trend]) -> Figure:
             panes[-1].xaxis.set_major_formatter(dates.ConciseDateFormatter(locator))
         else:
             panes[-1].set_xlabel("log")
-            panes[-1].xaxis.get_major_locator().set_params(integer=True)
+            panes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
         return figure
 
 
