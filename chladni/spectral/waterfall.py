@@ -234,19 +234,23 @@ class _Slices:
         self.group = 1
         self.count = 0
         self._means: list[Real] = []
-        self._pending: list[Real] = []
+        # Sum of the segments of the group that is open, and how many they are. The segments themselves would be as
+        # many as the log is long.
+        self._sum: Real | None = None
+        self._open = 0
 
     def add(self, segments: Real) -> None:
         """Add powers ``[segment, channel, frequency]``, in order."""
         for power in segments:
             self.count += 1
-            self._pending.append(power)
-            if len(self._pending) == self.group:
+            self._open += 1
+            self._sum = power.copy() if self._sum is None else self._sum + power
+            if self._open == self.group:
                 self._close()
 
     def slices(self) -> tuple[NDArray[np.floating], Real]:
         """Give ``[channel, slice, frequency]`` and the mean segment number of each slice."""
-        means = [*self._means, *([np.mean(self._pending, axis=0)] if self._pending else [])]
+        means = self._means if self._sum is None else [*self._means, self._sum / self._open]
         first = np.arange(len(means)) * self.group
         last = np.minimum(first + self.group, self.count) - 1
         power = np.stack(means, axis=1)
@@ -256,11 +260,12 @@ class _Slices:
         if len(self._means) == self.most:
             pairs = zip(self._means[::2], self._means[1::2], strict=True)
             self._means = [(one + other) / 2 for one, other in pairs]
-            # What is pending becomes the first half of a group twice as long.
+            # What is open becomes the first half of a group twice as long.
             self.group *= 2
             return
-        self._means.append(np.mean(self._pending, axis=0))
-        self._pending = []
+        if self._sum is not None:
+            self._means.append(self._sum / self._open)
+        self._sum, self._open = None, 0
 
 
 def _precision(power: Real) -> type[np.float32 | np.float64]:

@@ -1,9 +1,13 @@
 """Averages that run: channels that give nothing don't stop the others."""
 
+import pickle
+import tracemalloc
+
 import numpy as np
 
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.running import RunningAverages, running_segmentation
+from chladni.spectral.waterfall import WaterfallAccumulator
 from tests.spectral.made_signals import blocks, noise, series
 
 RATE_HZ = 500.0
@@ -53,3 +57,31 @@ def test_a_rate_that_is_told_later_scales_the_average() -> None:
     reference = cross_spectra(series(whole.values, rate_hz=true_hz), resolution_hz=true_hz / PLAN.samples)
     np.testing.assert_allclose(found.frequency_hz, reference.frequency_hz, rtol=1e-15)
     np.testing.assert_allclose(found.values, np.einsum("iif->if", reference.density).real, rtol=1e-12)
+
+
+def test_averages_of_a_long_time_are_no_larger_than_those_of_a_short_one() -> None:
+    """All that is joined where there's too much of it has been joined at least once by the end of the short time."""
+    short, step = 1 << 19, 1 << 15
+    averages = RunningAverages(series(noise(2, 1), rate_hz=RATE_HZ).channels, RATE_HZ, PLAN, fading_pairs_s=60.0)
+    sizes = []
+    for first in range(0, 2 * short, step):
+        start_ns = round(first / RATE_HZ * 1e9)
+        averages.update(series(noise(2, step, seed=first), rate_hz=RATE_HZ, start_time_ns=start_ns))
+        sizes.append(len(pickle.dumps(averages)))
+    # Between two joins it's half of the most, and all of it: the most of each doubling counts.
+    assert max(sizes[short // step :]) < 1.001 * max(sizes[: short // step])
+
+
+def test_a_waterfall_holds_its_slices_and_not_the_segments_that_they_are_made_of() -> None:
+    whole = series(noise(1, 1 << 17), rate_hz=128.0)
+    falling = WaterfallAccumulator(whole.channels, 128.0, running_segmentation(128.0), max_slices=4)
+    held = []
+    tracemalloc.start()
+    try:
+        for block in blocks(whole, [2048] * 64):
+            falling.update(block)
+            held.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    # 16 times as many segments to a slice; what the test itself holds is a few kB.
+    assert max(held[32:]) < 2 * max(held[2:4])
