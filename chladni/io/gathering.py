@@ -98,6 +98,17 @@ class Gathering:
         self.period_s = self.period_s or piece.period_s
         self.dtype = np.result_type(self.dtype, piece.values.dtype)
 
+    def join_last(self) -> None:
+        """Join the last pieces while the one before isn't much longer: of many short ones few long ones are left.
+
+        Each message is copied as often as its piece doubles, and what a piece was a part of is let go.
+        """
+        while len(self.stamps_ns) > 1 and self.stamps_ns[-2].size < 2 * self.stamps_ns[-1].size:
+            parts: list[Any]
+            for parts in (self.stamps_ns, self.counts, self.values, self.digests, self.eras):
+                parts[-2:] = [np.concatenate(parts[-2:], axis=-1)] if parts else []
+            self.arrivals[-2:] = [Arrivals.joined(self.arrivals[-2:])]
+
     @property
     def stamps_alike(self) -> bool:
         """Whether two messages in a row have the same stamp."""

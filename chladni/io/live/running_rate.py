@@ -38,6 +38,7 @@ class RunningRate:
 
     def __init__(self, stream: Stream, period_ns: float, *, stated: StatedRate | None = None) -> None:
         self._kept: Gathering | None = Gathering(stream=stream)
+        self._kept_messages = 0
         self._stated = stated
         self._rounded_hz: float | None = None
         self._period_ns = period_ns
@@ -61,7 +62,9 @@ class RunningRate:
         if self._kept is None:
             return
         self._kept.add(piece, with_values=False)
-        if sum(one.size for one in self._kept.stamps_ns) > MOST_KEPT:
+        self._kept.join_last()
+        self._kept_messages += piece.stamps_ns.size
+        if self._kept_messages > MOST_KEPT:
             base = self._kept.place(stated=self._stated).time_base
             self._rounded_hz = base.rate_hz if base.uniform and base.snapped else None
             self._kept = None
