@@ -5,13 +5,15 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from chladni.cli import options
 from chladni.cli.levels import MachineName
+from chladni.cli.opening import opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import number, with_error
@@ -25,6 +27,135 @@ MEGABYTE = 1_000_000
 TURN_S = 1e-3
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Following:
+    """Which samples are followed, and how they are averaged."""
+
+    channel: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PATH", help="Only this channel, named in full; may be repeated.", show_default=False),
+    ] = None
+    reference: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PATH", help="Channel of the excitation; a force is taken if not given.", show_default=False
+        ),
+    ] = None
+    band: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="LO-HI", help="Modes and levels between these frequencies, in Hz.", show_default=False),
+    ] = None
+    resolution: Annotated[
+        float | None,
+        typer.Option(
+            metavar="HZ",
+            help="Distance of the frequency lines; such that a segment takes 2 s at most if not given.",
+            show_default=False,
+        ),
+    ] = None
+    window: Annotated[str, typer.Option(metavar="NAME", help="Any SciPy window.")] = "hann"
+    overlap: Annotated[float, typer.Option(metavar="SHARE", help="Overlap of segments, 0 to 1.")] = 0.5
+    time_constant: Annotated[
+        float, typer.Option(metavar="S", help="After so long a segment has faded to 1/e in exponential averages.")
+    ] = 10.0
+    modes_every: Annotated[
+        float, typer.Option(metavar="S", help="How often modes are looked for in responses alone; 0 for never.")
+    ] = 5.0
+    machine: Annotated[
+        MachineName | None,
+        typer.Option(help="Class and foundation, for the zone of ISO 20816-3.", show_default=False),
+    ] = None
+    robot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Robot file, URDF or MJCF: the torque that it doesn't explain.", show_default=False
+        ),
+    ] = None
+    setup: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Setup file: points, directions, units, sensitivities.", show_default=False
+        ),
+    ] = None
+    stamp: Annotated[
+        Literal["auto", "header", "publish", "log"],
+        typer.Option(help="The time of a sample: its own stamp, when published, when logged."),
+    ] = "auto"
+    rate: options.Rate = None
+    end_after: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="End when nothing came for so long; else wait for ever.", show_default=False),
+    ] = None
+
+    def states(self, source: str, stop: threading.Event) -> "Iterator[LiveState]":
+        """Follow a source so."""
+        from chladni.apps.live import live as follow
+
+        return follow(
+            source,
+            channels=self.channel,
+            references=self.reference,
+            band_hz=self.band,
+            resolution_hz=self.resolution,
+            window=self.window,
+            overlap=self.overlap,
+            time_constant_s=self.time_constant,
+            modes_every_s=self.modes_every,
+            machine=self.machine,
+            robot=self.robot,
+            setup=self.setup,
+            stamp=self.stamp,
+            sample_rate_hz=self.rate,
+            patience_s=self.end_after,
+            stop=stop,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Showing:
+    """Where states are drawn to as they come."""
+
+    view: Annotated[
+        bool | None,
+        typer.Option("--view/--no-view", help="Open the viewer; it is, unless --save or --web is given."),
+    ] = None
+    save: Annotated[
+        Path | None,
+        typer.Option(metavar="OUT.rrd", help="Write a recording as samples come.", show_default=False),
+    ] = None
+    keep: Annotated[
+        float, typer.Option(metavar="MB", help="The recording takes so many megabytes at most; 0 for no bound.")
+    ] = 4000.0
+    web: Annotated[bool, typer.Option("--web", help="Serve to a browser on this computer only.")] = False
+
+    def __post_init__(self) -> None:
+        from chladni.signals.errors import SetupError
+
+        if not (self.keep == 0 or 10 <= self.keep < float("inf")):
+            raise SetupError(
+                f"--keep {self.keep:g} MB is too little for a recording; give 10 or more, or 0 for no bound"
+            )
+        if self.save is not None and self.web:
+            raise SetupError("--save writes a file and --web serves a page; give one of them")
+
+    def targets(self, out: Output) -> "list[Target]":
+        """Open them."""
+        from chladni.viewers.rerun.live_targets import RecordingFile, Viewer
+
+        targets: list[Target] = []
+        if self.save is not None:
+            targets.append(RecordingFile(self.save, keep_bytes=round(self.keep * MEGABYTE) or None))
+        if self.web:
+            served = Viewer(web=True)
+            targets.append(served)
+            out.line(f"{served.address}")
+            out.line("Open this address in a browser on this computer (nobody else can reach it); Ctrl-C ends.")
+        elif self.save is None if self.view is None else self.view:
+            targets.append(Viewer())
+        return targets
+
+
+@opens_files
 def live(
     source: Annotated[
         str,
@@ -36,135 +167,29 @@ def live(
         ),
     ],
     *,
-    channel: Annotated[
-        list[str] | None,
-        typer.Option(metavar="PATH", help="Only this channel, named in full; may be repeated.", show_default=False),
-    ] = None,
-    reference: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PATH", help="Channel of the excitation; a force is taken if not given.", show_default=False
-        ),
-    ] = None,
-    band: Annotated[
-        tuple[float, float] | None,
-        typer.Option(metavar="LO-HI", help="Modes and levels between these frequencies, in Hz.", show_default=False),
-    ] = None,
-    resolution: options.Resolution = None,
-    window: Annotated[str, typer.Option(metavar="NAME", help="Any SciPy window.")] = "hann",
-    overlap: Annotated[float, typer.Option(metavar="SHARE", help="Overlap of segments, 0 to 1.")] = 0.5,
-    time_constant: Annotated[
-        float, typer.Option(metavar="S", help="After so long a segment has faded to 1/e in exponential averages.")
-    ] = 10.0,
-    modes_every: Annotated[
-        float, typer.Option(metavar="S", help="How often modes are looked for in responses alone; 0 for never.")
-    ] = 5.0,
-    machine: Annotated[
-        MachineName | None,
-        typer.Option(help="Class and foundation, for the zone of ISO 20816-3.", show_default=False),
-    ] = None,
-    robot: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Robot file, URDF or MJCF: the torque that it doesn't explain.", show_default=False
-        ),
-    ] = None,
-    setup: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Setup file: points, directions, units, sensitivities.", show_default=False
-        ),
-    ] = None,
-    stamp: Annotated[
-        str, typer.Option(metavar="WHICH", help="The time of a sample: auto, header, publish or log.")
-    ] = "auto",
-    rate: options.Rate = None,
-    end_after: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="End when nothing came for so long; else wait for ever.", show_default=False),
-    ] = None,
-    view: Annotated[
-        bool | None,
-        typer.Option("--view/--no-view", help="Open the viewer; it is, unless --save or --web is given."),
-    ] = None,
-    save: Annotated[
-        Path | None,
-        typer.Option(metavar="OUT.rrd", help="Write a recording as samples come.", show_default=False),
-    ] = None,
-    keep: Annotated[
-        float, typer.Option(metavar="MB", help="The recording takes so many megabytes at most; 0 for no bound.")
-    ] = 4000.0,
-    web: Annotated[bool, typer.Option("--web", help="Serve to a browser on this computer only.")] = False,
+    following: Following,
+    showing: Showing,
     json: options.Json = None,
     figures: options.Figures = None,
     report: options.Report = None,
 ) -> None:
     """Averages, modes and what changes, of a log that is being written; Ctrl-C ends it with everything written."""
-    from chladni.apps.live import live as follow
-    from chladni.apps.live_document import EventBook, live_document
+    from chladni.apps.live_document import EventBook, live_document, live_study
 
     is_file = source != "-" and "://" not in source and not source.startswith("audio:")
-    reads = [Path(source) if is_file else None, setup, robot]
     require_places(
-        reads=reads, writes={"--json": json, "--save": save, "--report": report}, folders={"--figures": figures}
+        reads=[Path(source) if is_file else None, following.setup, following.robot],
+        writes={"--json": json, "--save": showing.save, "--report": report},
+        folders={"--figures": figures},
     )
-    _require_options(stamp, keep, save, web)
     out, book = Output(json), EventBook()
     # Samples, pictures and modes take turns at Python's lock: shorter turns, sooner pictures.
     sys.setswitchinterval(TURN_S)
     with _stopping() as stop:
-        states = follow(
-            source,
-            channels=channel,
-            references=reference,
-            band_hz=band,
-            resolution_hz=resolution,
-            window=window,
-            overlap=overlap,
-            time_constant_s=time_constant,
-            modes_every_s=modes_every,
-            machine=machine,
-            robot=robot,
-            setup=setup,
-            stamp=stamp,  # type: ignore[arg-type]  # checked above
-            sample_rate_hz=rate,
-            patience_s=end_after,
-            stop=stop,
-        )
-        shown = view if view is not None else save is None and not web
-        last = _follow(states, out, book, _targets(out, shown=shown, save=save, keep=keep, web=web))
+        last = _follow(following.states(source, stop), out, book, showing.targets(out))
     findings = _told(out, last, book)
-    from chladni.apps.live_document import live_study
-
     out.pictures(live_study(last, findings), figures=figures, report=report)
     out.json(live_document(last, book))
-
-
-def _require_options(stamp: str, keep: float, save: Path | None, web: bool) -> None:
-    from chladni.signals.errors import SetupError
-
-    if stamp not in ("auto", "header", "publish", "log"):
-        raise SetupError(f"--stamp {stamp!r} is none of auto, header, publish, log")
-    if not (keep == 0 or 10 <= keep < float("inf")):
-        raise SetupError(f"--keep {keep:g} MB is too little for a recording; give 10 or more, or 0 for no bound")
-    if save is not None and web:
-        raise SetupError("--save writes a file and --web serves a page; give one of them")
-
-
-def _targets(out: Output, *, shown: bool, save: Path | None, keep: float, web: bool) -> "list[Target]":
-    from chladni.viewers.rerun.live_targets import RecordingFile, Viewer
-
-    targets: list[Target] = []
-    if save is not None:
-        targets.append(RecordingFile(save, keep_bytes=round(keep * MEGABYTE) or None))
-    if web:
-        served = Viewer(web=True)
-        targets.append(served)
-        out.line(f"{served.address}")
-        out.line("Open this address in a browser on this computer (nobody else can reach it); Ctrl-C ends.")
-    elif shown:
-        targets.append(Viewer())
-    return targets
 
 
 def _follow(states: "Iterator[LiveState]", out: Output, book: "EventBook", targets: "list[Target]") -> "LiveState":

@@ -41,7 +41,7 @@ def test_a_finished_log_ends_by_its_footer_with_everything_written(run: Run, arm
 
 def test_options_that_cant_be_are_one_line(run: Run, arm: Path, tmp_path: Path) -> None:
     for words, told in (
-        (("--stamp", "never"), "--stamp 'never' is none of auto, header, publish, log"),
+        (("--stamp", "never"), "'never' is not one of 'auto', 'header', 'publish', 'log'"),
         (("--keep", "1"), "--keep 1 MB is too little"),
         (("--save", tmp_path / "a.rrd", "--web"), "give one of them"),
         (("--time-constant", "0"), "time_constant_s is 0"),
