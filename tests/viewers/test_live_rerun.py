@@ -75,6 +75,19 @@ def test_a_recording_is_bounded_and_both_its_files_are_whole(tmp_path: Path) -> 
     assert max(last) == pytest.approx(600.0 - 1 / RATE_HZ)
 
 
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted as Linux lists them")
+def test_a_file_that_is_full_leaves_none_of_its_threads_behind(tmp_path: Path) -> None:
+    target = RecordingFile(tmp_path / "a.rrd", keep_bytes=200_000)
+    threads = []
+    for state in states(40, samples=10_000):
+        target.draw([state])
+        threads.append(len(list(Path("/proc/self/task").iterdir())))
+    target.close()
+    # Each state fills a file.
+    assert target.earlier.exists()
+    assert max(threads[-10:]) <= max(threads[5:15])
+
+
 def test_a_disk_that_is_full_is_told_and_the_states_go_on() -> None:
     painter = Painter(RecordingFile("/dev/full"))
     told = []

@@ -24,6 +24,7 @@ from chladni.viewers.groups import Group, groups
 from chladni.viewers.labels import decibel_unit, thinned
 from chladni.viewers.rerun.canvas import LABEL_COLOUR, Canvas, draw_labels
 from chladni.viewers.rerun.entities import folder
+from chladni.viewers.rerun.lifetimes import send_blueprint
 from chladni.viewers.rerun.timelines import TIME, send_scalars, time_index
 from chladni.viewers.style import Style, amplitude_colours
 
@@ -130,7 +131,7 @@ class LiveDrawing:
 
     def arrange(self) -> None:
         """Send the blueprint: everything in its place."""
-        self._recording.send_blueprint(self._blueprint(), make_active=True, make_default=True)
+        send_blueprint(self._recording, self._blueprint())
 
     # --- waveforms ---
 

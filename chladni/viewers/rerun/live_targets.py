@@ -20,6 +20,7 @@ import rerun as rr
 from chladni.signals.errors import LogError
 from chladni.signals.live_state import LiveState
 from chladni.viewers.rerun.drawing import APPLICATION
+from chladni.viewers.rerun.lifetimes import end_unused_streams
 from chladni.viewers.rerun.live import LiveDrawing, rehearse
 from chladni.viewers.rerun.process import LOOPBACK, free_port, start, stop
 
@@ -123,6 +124,7 @@ class RecordingFile(Target):
         self.earlier.unlink(missing_ok=True)
         self.path.replace(self.earlier)
         self._begin()
+        end_unused_streams()
         self._drawn = True
         # Its samples, a moment long, are in both files.
         self._drawing.draw(replace(state, events=()))
@@ -335,7 +337,8 @@ class Painter:
         self.close()
 
     def _run(self) -> None:
-        more = self._draw(self.target.prepare)
+        self._try(self.target.prepare)
+        more = True
         while more:
             states = [self._states.get()]
             with suppress(queue.Empty):
@@ -344,24 +347,16 @@ class Painter:
             more = states[-1] is not None
             waiting = [state for state in states if state is not None]
             if waiting and not self._failed.is_set():
-                self._draw(partial(self.target.draw, waiting))
-        self._end()
+                self._try(partial(self.target.draw, waiting))
+        self._try(self.target.close)
 
-    def _draw(self, work: Callable[[], None]) -> bool:
+    def _try(self, work: Callable[[], None]) -> None:
+        """Do some work of the target; the first error is told, and nothing is drawn from then on."""
         try:
             work()
-        except Exception as error:  # noqa: BLE001  # whatever a viewer or a disk does, the averages go on
-            self._fail(error)
-        return True
-
-    def _end(self) -> None:
-        try:
-            self.target.close()
-        except Exception as error:  # noqa: BLE001  # as above
-            if not self._failed.is_set():
-                self._fail(error)
-
-    def _fail(self, error: Exception) -> None:
-        self._failed.set()
-        why = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        self._told.put(f"{self.target.what} ended: {why}; the averages go on without it")
+        except Exception as error:  # noqa: BLE001  # a day's averages don't end by a picture, whatever is wrong with it
+            if self._failed.is_set():
+                return
+            self._failed.set()
+            why = error.strerror if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
+            self._told.put(f"{self.target.what} ended: {why or error}; the averages go on without it")
