@@ -51,7 +51,7 @@ class Generator:
         self.begun_s = time.monotonic()
         self.late_s = 0.0
 
-    def rate_hz(self, _channels: Any, *, fitted: bool = True) -> float | None:  # noqa: ARG002
+    def rate_hz(self, _channels: Any, **_options: bool) -> float | None:
         """The rate is exact."""
         return None
 

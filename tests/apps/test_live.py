@@ -59,7 +59,7 @@ def last(log: Path) -> LiveState:
     return state
 
 
-def same(one: np.ndarray, other: np.ndarray) -> None:
+def assert_same(one: np.ndarray, other: np.ndarray) -> None:
     """To 1e-12 of the largest."""
     np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * float(np.nanmax(np.abs(other))))
 
@@ -67,8 +67,8 @@ def same(one: np.ndarray, other: np.ndarray) -> None:
 def test_densities_are_those_of_the_finished_file(log: Path, last: LiveState) -> None:
     assert last.ended
     reference = psd(log, resolution_hz=RESOLUTION_HZ)
-    same(last.densities[0].values, reference.values)
-    same(last.densities[0].frequency_hz, reference.frequency_hz)
+    assert_same(last.densities[0].values, reference.values)
+    assert_same(last.densities[0].frequency_hz, reference.frequency_hz)
     assert last.densities[0].provenance.averages == reference.provenance.averages
 
 
@@ -77,8 +77,8 @@ def test_exponential_averages_and_peak_hold_are_those_of_the_finished_file(log: 
         series = opened.read()
     exponential = cross_spectra(series, resolution_hz=RESOLUTION_HZ, averaging="exponential", time_constant_s=10.0)
     held = cross_spectra(series, resolution_hz=RESOLUTION_HZ, averaging="peak-hold")
-    same(last.exponential[0].values, np.einsum("iif->if", exponential.density).real)
-    same(last.peak_hold[0].values, np.einsum("iif->if", held.density).real)
+    assert_same(last.exponential[0].values, np.einsum("iif->if", exponential.density).real)
+    assert_same(last.peak_hold[0].values, np.einsum("iif->if", held.density).real)
 
 
 def test_frequency_responses_coherence_and_modes_are_those_of_the_finished_file(log: Path, last: LiveState) -> None:
@@ -86,26 +86,27 @@ def test_frequency_responses_coherence_and_modes_are_those_of_the_finished_file(
     assert last.response is not None
     assert last.coherence is not None
     assert last.modes is not None
-    same(last.response.values, frf(log, references=FORCE, resolution_hz=RESOLUTION_HZ).values)
-    same(last.coherence.values, coherence(spectra, references=FORCE).values)
+    assert_same(last.response.values, frf(log, references=FORCE, resolution_hz=RESOLUTION_HZ).values)
+    assert_same(last.coherence.values, coherence(spectra, references=FORCE).values)
     modes = identify_modes(spectra.select([channel.name for channel in last.modes.channels]))
-    same(last.modes.frequency_hz, modes.frequency_hz)
-    same(last.modes.damping_ratio, modes.damping_ratio)
-    same(last.modes.shapes, modes.shapes)
+    assert_same(last.modes.frequency_hz, modes.frequency_hz)
+    assert_same(last.modes.damping_ratio, modes.damping_ratio)
+    assert_same(last.modes.shapes, modes.shapes)
     assert modes.frequency_hz.size >= 3
 
 
 def test_waterfall_levels_and_severity_are_those_of_the_finished_file(log: Path, last: LiveState) -> None:
     with open_log(log) as opened:
         series = opened.read()
-    same(last.waterfalls[0].values, waterfall(series, resolution_hz=RESOLUTION_HZ).values)
-    same(last.levels[0].rms, levels(series).rms)
-    same(last.levels[0].kurtosis, levels(series).kurtosis)
-    same(last.severities[0].velocity_mm_s, severity(series).velocity_mm_s)
+    assert_same(last.waterfalls[0].values, waterfall(series, resolution_hz=RESOLUTION_HZ).values)
+    assert_same(last.levels[0].rms, levels(series).rms)
+    assert_same(last.levels[0].kurtosis, levels(series).kurtosis)
+    assert_same(last.severities[0].velocity_mm_s, severity(series).velocity_mm_s)
 
 
 def test_modes_of_the_present_are_followed_by_their_numbers(last: LiveState) -> None:
     truth_hz = chain(first_hz=8.0).frequency_hz
+    assert len(last.tracked) >= 3
     for mode in last.tracked:
         assert np.abs(truth_hz - mode.frequency_hz).min() < 0.05 * mode.frequency_hz
 

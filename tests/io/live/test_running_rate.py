@@ -22,7 +22,9 @@ def test_stamps_that_come_one_by_one_take_little_more_memory_than_their_numbers(
             stamps_ns = np.array([number * 1_000_000])
             arrivals = Arrivals(log_ns=stamps_ns, sequence=np.zeros(1, np.uint32))
             values = np.zeros((1, 1), np.float32)
-            rate.keep(Piece(stamps_ns=stamps_ns, counts=None, period_s=0.0, values=values, lost={}, arrivals=arrivals))
+            rate.keep(
+                Piece(stamps_ns=stamps_ns, counts=None, period_s=0.0, values=values, lost={}, arrivals=arrivals)
+            )
         held = tracemalloc.get_traced_memory()[0]
     finally:
         tracemalloc.stop()
