@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from math import ceil, floor
 from typing import Any, Final
 
@@ -16,17 +15,18 @@ from chladni.signals.channel import Channel
 from chladni.signals.live_state import LiveState, TrackedMode
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.time_series import NS_PER_S, TimeSeries
-from chladni.signals.units import power_density_unit
 from chladni.signals.visible import visible
 from chladni.signals.waterfall import Waterfall
 from chladni.viewers.drawing import block_maximum, decibels_of_amplitude, decibels_of_power
 from chladni.viewers.groups import Group, groups
 from chladni.viewers.labels import decibel_unit, thinned
-from chladni.viewers.rerun.canvas import LABEL_COLOUR, Canvas, draw_labels
+from chladni.viewers.rerun.canvas import Canvas, draw_labels
+from chladni.viewers.rerun.drawing import APPLICATION
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.lifetimes import send_blueprint
+from chladni.viewers.rerun.live_waterfalls import LiveWaterfalls
 from chladni.viewers.rerun.timelines import TIME, send_scalars, time_index
-from chladni.viewers.style import Style, amplitude_colours
+from chladni.viewers.style import Style
 
 #: Seconds of waveform that are seen at a time.
 SCROLL_S: Final = 5.0
@@ -34,18 +34,14 @@ SCROLL_S: Final = 5.0
 MODES_S: Final = 120.0
 #: Values a second that are drawn as they are; of more, the extremes of stretches.
 VALUES_A_SECOND: Final = 300_000
-#: How often curves are redrawn, and waterfalls, which weigh more, in seconds of the source.
+#: How often curves are redrawn, in seconds of the source.
 CURVES_EVERY_S: Final = 0.5
-WATERFALLS_EVERY_S: Final = 5.0
 #: Points of a curve: about as many as a window has pixels.
 POINTS: Final = 1200
-#: Size of canvases and of waterfall pictures.
+#: Size of canvases.
 CANVAS: Final = (1000.0, 480.0)
-PICTURE: Final = (1000, 420)
 SPAN_DB: Final = 100.0
 STEP_DB: Final = 20.0
-#: Waterfalls drawn, the first channels of each grid.
-MOST_WATERFALLS: Final = 12
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -93,9 +89,8 @@ class LiveDrawing:
         self._origin_ns = 0
         self._stretch = 1
         self._planes: dict[str, _Plane] = {}
-        self._falls: list[str] = []
-        self._turn = self._pictures = 0
-        self._curves_s = self._falls_s = -np.inf
+        self._falls = LiveWaterfalls(recording)
+        self._curves_s = -np.inf
         self._parts: set[str] = set()
         self._tracked: set[int] = set()
 
@@ -112,7 +107,7 @@ class LiveDrawing:
         if self._style is None:
             self._recording.send_recording_name(visible(state.title))
             self._origin_ns = state.start_time_ns
-        before = len(self._parts) + len(self._grids) + len(self._falls)
+        before = len(self._parts) + len(self._grids) + self._falls.count
         self._note_channels(state)
         for event in state.events:
             self._log("/events", event.time_s, rr.TextLog(visible(event.text), level=_level(event.kind)))
@@ -121,13 +116,9 @@ class LiveDrawing:
         if curves and state.fresh and (state.time_s - self._curves_s >= CURVES_EVERY_S or state.ended):
             self._curves_s = state.time_s
             self._curves(state)
-        if state.ended:
-            self._waterfalls(state, 1 << 16)
-        elif curves and state.time_s - self._falls_s >= WATERFALLS_EVERY_S / max(1, self._pictures):
-            # One picture at a time, so that none holds up the waveforms.
-            self._falls_s = state.time_s
-            self._waterfalls(state, 1)
-        return len(self._parts) + len(self._grids) + len(self._falls) > before
+        if self._style is not None and (curves or state.ended):
+            self._falls.draw(state, self._style, origin_ns=self._origin_ns)
+        return len(self._parts) + len(self._grids) + self._falls.count > before
 
     def arrange(self) -> None:
         """Send the blueprint: everything in its place."""
@@ -273,65 +264,6 @@ class LiveDrawing:
             self._recording, f"{path}/legend", places, texts, colours=[self._style.on_dark(one) for one in channels]
         )
 
-    # --- waterfalls ---
-
-    def _waterfalls(self, state: LiveState, count: int) -> None:
-        """Draw the next few waterfalls, in turn."""
-        shown = [
-            (folder("waterfall", str(place), str(row)), fall, row)
-            for place, fall in enumerate(state.waterfalls, start=1)
-            for row in range(min(MOST_WATERFALLS, len(fall.channels)))
-        ]
-        self._pictures = len(shown)
-        for path, fall, row in [shown[(self._turn + one) % len(shown)] for one in range(min(count, len(shown)))]:
-            self._waterfall(path, fall, row, fall.channels[row], state.time_s)
-        self._turn += count
-
-    def _waterfall(self, path: str, fall: Waterfall, row: int, channel: Channel, time_s: float) -> None:
-        levels = decibels_of_power(fall.values[row])
-        known = levels[np.isfinite(levels)]
-        if not known.size or self._style is None:
-            return
-        high = float(np.percentile(known, 99.9))
-        share = np.nan_to_num(np.clip((levels - high) / (SPAN_DB * 0.6) + 1, 0.0, 1.0))
-        picture = _COLOURS[_resized((255 * share).astype(np.uint8), PICTURE)]
-        self._log(f"{path}/picture", time_s, rr.EncodedImage(contents=_jpeg(picture), media_type="image/jpeg"))
-        step_s = float(fall.time_s[1] - fall.time_s[0]) if fall.time_s.size > 1 else 1.0
-        first_s = float(fall.time_s[0]) - step_s / 2 + (fall.start_time_ns - self._origin_ns) / NS_PER_S
-        last_s = float(fall.time_s[-1]) + step_s / 2 + (fall.start_time_ns - self._origin_ns) / NS_PER_S
-        canvas = Canvas(
-            width=PICTURE[0],
-            height=PICTURE[1],
-            x_range=(0.0, float(fall.frequency_hz[-1])),
-            y_range=(last_s, first_s),
-        )
-        self._time_axis(path, canvas, time_s)
-        if path not in self._falls:
-            self._falls.append(path)
-            self._planes[path] = _Plane(path=path, canvas=canvas)
-            self._planes[
-                path
-            ].path = f"{self._style.labels[channel.name]} [{decibel_unit(power_density_unit(channel.unit))}]"
-
-    def _time_axis(self, path: str, canvas: Canvas, time_s: float) -> None:
-        """Numbers beside and below the picture; they move with it."""
-        from chladni.viewers.drawing import ticks
-
-        x, y = ticks(*canvas.x_range, count=10), ticks(canvas.y_range[1], canvas.y_range[0], count=6)
-        below = canvas.places(x, np.full(x.size, canvas.y_range[0])) + np.array([0.0, 4.0])
-        beside = canvas.places(np.zeros(y.size), y) - np.array([24.0, 8.0])
-        names = np.array([(canvas.width / 2, canvas.height + 34.0), (-24.0, -34.0)])
-        labels = [f"{one:g}" for one in (*x, *y)] + ["Hz", "s"]
-        points = rr.Points2D(
-            np.vstack([below, beside, names]),
-            labels=labels,
-            show_labels=True,
-            colors=[LABEL_COLOUR] * len(labels),
-            radii=rr.Radius.ui_points(0.0),
-            draw_order=10.0,
-        )
-        self._log(f"{path}/axes", time_s, points)
-
     # --- modes ---
 
     def _modes(self, state: LiveState) -> None:
@@ -395,9 +327,8 @@ class LiveDrawing:
             name="Overview",
         )
         pages: list[rrb.Container] = [first]
-        if self._falls:
-            falls = [self._fall_view(path) for path in self._falls]
-            pages.append(rrb.Tabs(*falls, name="Waterfalls"))
+        if self._falls.count:
+            pages.append(rrb.Tabs(*self._falls.views(), name="Waterfalls"))
         if answers:
             pages.append(
                 rrb.Vertical(_stack(answers), _stack(coherences), row_shares=[2, 1], name="Frequency responses")
@@ -431,12 +362,6 @@ class LiveDrawing:
             raise AssertionError("a plane without a canvas has no view")
         # Above stands the name of the axis.
         return canvas.view(path, name, left=110.0, above=100.0)
-
-    def _fall_view(self, path: str) -> rrb.View:
-        canvas = self._planes[path].canvas
-        if canvas is None:
-            raise AssertionError("a waterfall without a canvas has no view")
-        return canvas.view(path, self._planes[path].path)
 
 
 def _last(seconds: float) -> rrb.TimeAxis:
@@ -483,26 +408,6 @@ def _known_runs(curve: Real) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 1]
 
 
-_COLOURS: Final = amplitude_colours(np.linspace(0.0, 1.0, 256))
-
-
-def _resized(levels: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Levels ``[time, line]`` as ``[row, column]`` of a picture; peaks stay."""
-    shown, _ = block_maximum(levels, axis=1, limit=size[0])
-    shown, _ = block_maximum(shown, axis=0, limit=size[1])
-    rows = np.arange(size[1]) * shown.shape[0] // size[1]
-    columns = np.arange(size[0]) * shown.shape[1] // size[0]
-    return np.asarray(shown[rows[:, np.newaxis], columns], dtype=np.uint8)
-
-
-def _jpeg(picture: NDArray[Any]) -> bytes:
-    from PIL import Image
-
-    held = BytesIO()
-    Image.fromarray(picture).save(held, "JPEG", quality=85)
-    return held.getvalue()
-
-
 def _mode_table(modes: Sequence[TrackedMode]) -> str:
     if not modes:
         return "No mode stands out of the scatter yet."
@@ -517,7 +422,7 @@ def _mode_table(modes: Sequence[TrackedMode]) -> str:
 
 def rehearse() -> None:
     """Draw a made state into a recording that nobody sees, so that the first one that counts isn't late."""
-    recording = rr.RecordingStream("rehearsal")
+    recording = rr.RecordingStream(APPLICATION)
     stream = rr.binary_stream(recording)
     noise = np.random.default_rng(0).standard_normal((2, 256))
     series = TimeSeries.from_arrays(noise, sample_rate_hz=256.0, units="m/s^2")
