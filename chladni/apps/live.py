@@ -2,27 +2,24 @@
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from chladni.apps.excitation import FORCE_UNITS, excitations
+from chladni.apps.live_modes import ModeJob, ModeLook, ModeLooks, Schedule
 from chladni.apps.modal_channels import motions_of_one_unit
-from chladni.apps.modes import Band, Wanted, modes_of_spectra
+from chladni.apps.modes import Band, Wanted
 from chladni.io.live.door import LiveSamples, open_live
 from chladni.io.live.instrument import Instrument
 from chladni.io.live.reception import MessageSource, Samples
 from chladni.io.setup import Setup
 from chladni.io.stamps import StampRequest
-from chladni.modal.operational.mode_tracking import ModeTracker
 from chladni.signals.channel import Channel, Names, as_names
-from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError, SetupError
-from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.live_state import EventKind, LiveEvent, LiveState
-from chladni.signals.mode_set import ModeSet
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.spectral.change_watch import ChangeWatch, SignalChange
 from chladni.spectral.running import TIME_CONSTANT_S, RunningAverages, running_segmentation
@@ -32,6 +29,7 @@ from chladni.spectral.windows import Window
 if TYPE_CHECKING:
     from chladni.robots.robot import Robot
     from chladni.robots.torque_residual import TorqueResidual
+    from chladni.signals.cross_spectra import CrossSpectra
 
 #: How long a source is waited for; a state comes at least as often while samples do.
 POLL_S: Final = 0.02
@@ -40,10 +38,10 @@ GATHER_S: Final = 0.01
 #: How often averages are renewed, and modes looked for.
 AVERAGES_EVERY_S: Final = 0.5
 MODES_EVERY_S: Final = 5.0
-#: Work of each kind that renews averages takes at most this share of the time.
-SHARE: Final = 0.1
 #: More channels than these, and modes of the present are looked for in the average over all.
 MOST_FADING: Final = 32
+#: Windows that wait to be compared with what is usual; a minute of them, or more.
+MOST_WINDOWS_WAITING: Final = 12
 #: Time constant of the averages from which modes of the present are taken.
 RECENT_S: Final = 20.0
 
@@ -163,21 +161,6 @@ class _Options:
             raise SetupError(f"modes_every_s is {self.modes_every_s}; it must be 0 (never) or more, and finite")
 
 
-class _Schedule:
-    """Says when it's time again for some work, so that it takes a bounded share of the time."""
-
-    def __init__(self, every_s: float) -> None:
-        self._every_s = every_s
-        self._next_s = 0.0
-
-    @property
-    def due(self) -> bool:
-        return time.monotonic() >= self._next_s
-
-    def done(self, took_s: float) -> None:
-        self._next_s = time.monotonic() + max(self._every_s, took_s / SHARE)
-
-
 @dataclass(slots=True, kw_only=True, eq=False)
 class _Grid:
     """Averages of one sampling grid."""
@@ -196,15 +179,13 @@ class _Session:
         self._samples = samples
         self._options = options
         self._grids: dict[tuple[Channel, ...], _Grid] = {}
-        self._tracker = ModeTracker()
-        self._spectra_due = _Schedule(AVERAGES_EVERY_S)
-        self._pairs_due = _Schedule(2 * AVERAGES_EVERY_S)
-        self._levels_due = _Schedule(2 * AVERAGES_EVERY_S)
+        self._spectra_due = Schedule(AVERAGES_EVERY_S)
+        self._pairs_due = Schedule(2 * AVERAGES_EVERY_S)
+        self._levels_due = Schedule(2 * AVERAGES_EVERY_S)
         self._torques: dict[tuple[Channel, ...], TorqueResidual | None] = {}
         self._pairs: dict[tuple[Channel, ...], CrossSpectra] = {}
-        self._modes_due = _Schedule(options.modes_every_s)
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="modes")
-        self._look: Future[_Look] | None = None
+        self._looks = ModeLooks(self._worker, every_s=options.modes_every_s)
         self._judging: Future[tuple[SignalChange, ...]] | None = None
         self._start_ns: int | None = None
         self._end_ns = 0
@@ -231,18 +212,23 @@ class _Session:
 
     def _judge(self, *, ended: bool) -> None:
         """Compare full windows with what is usual, in the thread: it takes longer than a picture may wait."""
-        if self._judging is not None and (ended or self._judging.done()):
-            for change in self._judging.result():
-                self._tell(change.kind, change.text, change.time_ns)
+        # What is fed faster than it can be judged waits here: windows that wait would take ever more memory.
+        behind = any(grid.watch.waiting > MOST_WINDOWS_WAITING for grid in self._grids.values())
+        if self._judging is not None and (ended or behind or self._judging.done()):
+            self._tell_changes(self._judging.result())
             self._judging = None
-        for grid in self._grids.values():
-            if not grid.watch.ready:
-                continue
-            if ended:
-                for change in grid.watch.judge():
-                    self._tell(change.kind, change.text, change.time_ns)
-            elif self._judging is None:
+        if ended:
+            for grid in self._grids.values():
+                self._tell_changes(grid.watch.judge())
+        elif self._judging is None and self._grids:
+            # The grid with most windows first, or one that is fed fast would keep the others waiting.
+            grid = max(self._grids.values(), key=lambda one: one.watch.waiting)
+            if grid.watch.waiting:
                 self._judging = self._worker.submit(grid.watch.judge)
+
+    def _tell_changes(self, changes: Iterable[SignalChange]) -> None:
+        for change in changes:
+            self._tell(change.kind, change.text, change.time_ns)
 
     def close(self) -> None:
         """Let go of the source and of the thread."""
@@ -279,8 +265,7 @@ class _Session:
             grid.averages.leave_out(silent)
         grid.averages.update(block)
         _note_moving(grid, block)
-        for change in grid.watch.take(block):
-            self._tell(change.kind, change.text, change.time_ns)
+        self._tell_changes(grid.watch.take(block))
 
     def _residual(self, block: TimeSeries) -> TimeSeries | None:
         """Torque that the robot's description doesn't explain; None for blocks that don't hold its joints."""
@@ -349,10 +334,10 @@ class _Session:
         if self._grids and (ended or self._pairs_due.due):
             self._timed(self._pairs_due, lambda: self._renew_response(ended))
         if self._grids and self._options.modes_every_s > 0:
-            self._renew_modes(ended)
+            self._renew_modes(ended=ended)
         return fresh
 
-    def _timed(self, schedule: _Schedule, work: Any) -> bool:
+    def _timed(self, schedule: Schedule, work: Any) -> bool:
         begun_s = time.monotonic()
         done = bool(work())
         schedule.done(time.monotonic() - begun_s)
@@ -391,7 +376,7 @@ class _Session:
     def _renew_response(self, ended: bool) -> bool:
         for channels, grid in self._grids.items():
             names = self._references(channels, grid)
-            looked_at = self._options.modes_every_s > 0 and (ended or self._modes_due.due)
+            looked_at = self._options.modes_every_s > 0 and (ended or self._looks.due)
             if not looked_at and (not names or len(names) == len(channels)):
                 continue
             try:
@@ -414,22 +399,27 @@ class _Session:
 
     # --- modes ---
 
-    def _renew_modes(self, ended: bool) -> None:
-        if self._look is not None and (ended or self._look.done()):
-            self._enter(self._look.result())
-            self._look = None
-        if not (ended or (self._look is None and self._modes_due.due)):
+    def _renew_modes(self, *, ended: bool) -> None:
+        for look in self._looks.finished(wait=ended):
+            self._enter(look)
+        if not (ended or self._looks.due):
             return
-        grid = max(self._grids.items(), key=lambda item: len(item[0]))
-        job = self._job(*grid, ended=ended)
+        channels, grid = max(self._grids.items(), key=lambda item: len(item[0]))
+        try:
+            job = self._job(channels, grid)
+        except EstimateError as error:
+            if ended:
+                self._once(str(error))
+            return
         if job is None:
             return
         if ended:
             self._enter(job.look())
         else:
-            self._look = self._worker.submit(job.look)
+            self._looks.begin(job)
 
-    def _job(self, channels: Sequence[Channel], grid: _Grid, *, ended: bool) -> "_Job | None":
+    def _job(self, channels: Sequence[Channel], grid: _Grid) -> ModeJob | None:
+        """Averages of the responses, as they are now; None where there are no responses, or no new averages."""
         references = self._references(channels, grid)
         answers = [
             channel
@@ -442,32 +432,21 @@ class _Session:
             return None
         for note in notes:
             self._once(note)
-        try:
-            if (spectra := self._pairs.pop(tuple(channels), None)) is None:
-                return None
-            whole = spectra.select(names)
-            recent = whole if len(channels) > MOST_FADING else grid.averages.recent_spectra().select(names)
-        except EstimateError as error:
-            if ended:
-                self._once(str(error))
+        if (spectra := self._pairs.pop(tuple(channels), None)) is None:
             return None
-        wanted = Wanted.of(
-            bands_hz=None if self._options.band_hz is None else [self._options.band_hz],
-            count=None,
-            frequencies_hz=None,
-        )
-        return _Job(whole=whole, recent=recent, wanted=wanted, time_s=self._time_s)
+        whole = spectra.select(names)
+        recent = whole if len(channels) > MOST_FADING else grid.averages.recent_spectra().select(names)
+        band_hz = self._options.band_hz
+        wanted = Wanted.of(bands_hz=None if band_hz is None else [band_hz], count=None, frequencies_hz=None)
+        return ModeJob(whole=whole, recent=recent, wanted=wanted, time_s=self._time_s)
 
-    def _enter(self, look: "_Look") -> None:
-        self._modes_due.done(look.took_s)
-        if look.why is not None:
-            self._once(look.why)
+    def _enter(self, look: ModeLook) -> None:
         if look.whole is not None:
             self._values["modes"] = look.whole
+        for text in self._looks.follow(look):
+            self._tell("mode", text, None)
         if look.recent is not None:
-            for text in self._tracker.look(look.recent, look.time_s):
-                self._tell("mode", text, None)
-            self._values |= {"recent": look.recent, "tracked": self._tracker.modes}
+            self._values |= {"recent": look.recent, "tracked": self._looks.tracked}
 
     # --- states ---
 
@@ -488,42 +467,6 @@ class _Session:
             ended=ended,
             **self._values,
         )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Look:
-    """Modes found at one look; `why` says why there are none."""
-
-    whole: ModeSet | None
-    recent: ModeSet | None
-    why: str | None
-    time_s: float
-    took_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Job:
-    """Averages from which modes are to be identified."""
-
-    whole: CrossSpectra
-    recent: CrossSpectra
-    wanted: Wanted
-    time_s: float
-
-    @in_one_thread()
-    def look(self) -> _Look:
-        """Identify the modes of both averages."""
-        begun_s = time.monotonic()
-        whole, why = self._of(self.whole)
-        recent, _ = (whole, why) if self.recent is self.whole else self._of(self.recent)
-        return _Look(whole=whole, recent=recent, why=why, time_s=self.time_s, took_s=time.monotonic() - begun_s)
-
-    def _of(self, spectra: CrossSpectra) -> tuple[ModeSet | None, str | None]:
-        try:
-            return modes_of_spectra(spectra, method=None, wanted=self.wanted), None
-        except EstimateError:
-            # Mostly too few averages yet; at the end there is a note on it.
-            return None, None
 
 
 def _note_moving(grid: _Grid, block: TimeSeries) -> None:

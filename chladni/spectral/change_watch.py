@@ -94,9 +94,9 @@ class ChangeWatch:
         self._full: deque[tuple[PowerSpectralDensity, int]] = deque()
 
     @property
-    def ready(self) -> bool:
-        """Whether there are windows to judge."""
-        return bool(self._full)
+    def waiting(self) -> int:
+        """How many windows there are to judge."""
+        return len(self._full)
 
     def update(self, block: TimeSeries) -> tuple[SignalChange, ...]:
         """Take the next block; give what changed."""

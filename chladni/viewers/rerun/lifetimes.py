@@ -8,11 +8,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 import rerun_bindings
 
+from chladni.viewers.rerun.drawing import APPLICATION
+
 
 def send_blueprint(recording: rr.RecordingStream, blueprint: rrb.Blueprint) -> None:
     """Send a blueprint that is to be used at once, as ``recording.send_blueprint``; its stream ends."""
     native = rerun_bindings.new_blueprint(
-        application_id=recording.get_application_id(),
+        application_id=rr.get_application_id(recording) or APPLICATION,
         make_default=False,
         make_thread_default=False,
         default_enabled=True,
