@@ -34,6 +34,7 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.modal_fit import ModalFit
 from chladni.signals.mode_set import ModeSet
+from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.signals.time_series import TimeSeries
 from chladni.viewers.bench import picking_panel, serve_picking
 from chladni.viewers.bench.picked import Picked
@@ -75,11 +76,7 @@ class ModePicking:
         self._choose = choose
         self.title = title
         found = self._first(start_hz)
-        if found.modes.stabilisation is None:
-            raise SetupError(
-                "this method has no model orders, so there is no stabilisation chart to pick from; "
-                "take plscf with an excitation, or ssi-cov for responses alone"
-            )
+        _diagram(found.modes)
         self.shown = found
         self.asked = found.frequencies_hz
 
@@ -106,8 +103,7 @@ class ModePicking:
         tuple of float
             The frequencies that are asked for now.
         """
-        diagram = self.shown.modes.stabilisation
-        assert diagram is not None  # noqa: S101  # checked at the start
+        diagram = _diagram(self.shown.modes)
         mode = int(diagram.mode[row])
         if mode >= 0:
             # Both rise: the first frequency is the first mode's.
@@ -323,6 +319,15 @@ def _of_response(response: FrequencyResponse, method: Method | None, first: Want
         return response, modes_of_response(response, method=method, wanted=_asking(first, frequencies_hz))
 
     return ModePicking(in_one_thread()(partial(choose)), title="modes", start_hz=first.frequencies_hz)
+
+
+def _diagram(modes: ModeSet) -> StabilisationDiagram:
+    if modes.stabilisation is None:
+        raise SetupError(
+            "this method has no model orders, so there is no stabilisation chart to pick from; "
+            "take plscf with an excitation, or ssi-cov for responses alone"
+        )
+    return modes.stabilisation
 
 
 def _require_orders(method: Method | None) -> None:
