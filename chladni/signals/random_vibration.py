@@ -7,7 +7,7 @@ import numpy as np
 
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
-from chladni.signals.errors import EstimateError
+from chladni.signals.profile import between, require_profile
 from chladni.signals.units import power_density_unit
 from chladni.signals.value import Value, of_channel, require_frequency_axis, require_shape
 
@@ -44,16 +44,9 @@ class RandomProfile(Value):
     lower_db: float = 3.0
 
     def __post_init__(self) -> None:
-        require_frequency_axis(self.frequency_hz)
-        require_shape("density", self.density, self.frequency_hz.shape, "frequency_hz")
-        if self.frequency_hz.size < 2 or not self.frequency_hz[0] > 0:
-            raise EstimateError("a profile needs two breakpoints or more, above 0 Hz")
-        if not np.all((self.density > 0) & np.isfinite(self.density)):
-            raise EstimateError("densities of a profile must be finite and above 0")
-        if not (0 <= self.upper_db < np.inf and 0 <= self.lower_db < np.inf):
-            raise EstimateError(
-                f"a tolerance of +{self.upper_db:g} and -{self.lower_db:g} dB; both must be 0 or more"
-            )
+        require_profile(
+            self.frequency_hz, self.density, name="density", upper_db=self.upper_db, lower_db=self.lower_db
+        )
         self._freeze()
 
     def unit_at(self, field: str, place: tuple[int, ...]) -> str:  # noqa: ARG002
@@ -62,10 +55,7 @@ class RandomProfile(Value):
 
     def at(self, frequency_hz: Real) -> Real:
         """Density at each frequency; NaN outside the breakpoints."""
-        inside = (frequency_hz >= self.frequency_hz[0]) & (frequency_hz <= self.frequency_hz[-1])
-        log_f = np.log(np.where(inside, frequency_hz, self.frequency_hz[0]))
-        found = np.exp(np.interp(log_f, np.log(self.frequency_hz), np.log(self.density)))
-        return np.where(inside, found, np.nan)
+        return between(self.frequency_hz, self.density, frequency_hz)
 
     def rms(self) -> float:
         """Root mean square of the whole profile: the closed integral of each power law between breakpoints."""

@@ -7,8 +7,8 @@ import numpy as np
 
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
-from chladni.signals.errors import EstimateError
-from chladni.signals.value import Value, of_channel, require_frequency_axis, require_shape
+from chladni.signals.profile import between, require_profile
+from chladni.signals.value import Value, of_channel, require_shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,24 +44,14 @@ class SineProfile(Value):
     lower_db: float = 1.0
 
     def __post_init__(self) -> None:
-        require_frequency_axis(self.frequency_hz)
-        require_shape("amplitude", self.amplitude, self.frequency_hz.shape, "frequency_hz")
-        if self.frequency_hz.size < 2 or not self.frequency_hz[0] > 0:
-            raise EstimateError("a profile needs two breakpoints or more, above 0 Hz")
-        if not np.all((self.amplitude > 0) & np.isfinite(self.amplitude)):
-            raise EstimateError("amplitudes of a profile must be finite and above 0")
-        if not (0 <= self.upper_db < np.inf and 0 <= self.lower_db < np.inf):
-            raise EstimateError(
-                f"a tolerance of +{self.upper_db:g} and -{self.lower_db:g} dB; both must be 0 or more"
-            )
+        require_profile(
+            self.frequency_hz, self.amplitude, name="amplitude", upper_db=self.upper_db, lower_db=self.lower_db
+        )
         self._freeze()
 
     def at(self, frequency_hz: Real) -> Real:
         """Peak acceleration in m/s^2 at each frequency; NaN outside the breakpoints."""
-        inside = (frequency_hz >= self.frequency_hz[0]) & (frequency_hz <= self.frequency_hz[-1])
-        log_f = np.log(np.where(inside, frequency_hz, self.frequency_hz[0]))
-        found = np.exp(np.interp(log_f, np.log(self.frequency_hz), np.log(self.amplitude)))
-        return np.where(inside, found, np.nan)
+        return between(self.frequency_hz, self.amplitude, frequency_hz)
 
     def velocity_m_s(self, frequency_hz: Real) -> Real:
         """Peak velocity at each frequency, a / omega."""

@@ -10,6 +10,7 @@ from chladni.signals.arrays import Real
 from chladni.signals.channel import Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.profile import rising
 from chladni.signals.random_vibration import ProbabilityDensity, ProfileCheck, RandomProfile, VibrationResponse
 from chladni.signals.units import si_factor
 from chladni.spectral.filters import require_measured
@@ -55,14 +56,10 @@ def random_profile(
     6.06
     """
     factor, si_unit = si_factor(unit)
-    points = np.asarray(list(breakpoints), dtype=np.float64).reshape(-1, 2)
-    falls = np.flatnonzero(~(np.diff(points[:, 0]) > 0))
-    if falls.size:
-        before, after = points[falls[0] : falls[0] + 2, 0]
-        raise EstimateError(f"breakpoint {after:g} Hz follows {before:g} Hz; give them in rising order, each once")
+    frequency_hz, density = rising(breakpoints)
     return RandomProfile(
-        frequency_hz=points[:, 0],
-        density=points[:, 1] * factor**2,
+        frequency_hz=frequency_hz,
+        density=density * factor**2,
         unit=si_unit,
         upper_db=upper_db,
         lower_db=lower_db,

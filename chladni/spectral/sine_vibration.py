@@ -9,6 +9,7 @@ from scipy.ndimage import uniform_filter1d
 from chladni.io.source import SeriesLike, series_of
 from chladni.signals.channel import Names
 from chladni.signals.errors import EstimateError, SetupError
+from chladni.signals.profile import rising
 from chladni.signals.sine_vibration import SineCheck, SineProfile
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import si_factor
@@ -62,14 +63,8 @@ def sine_profile(
     factor, si_unit = si_factor(unit)
     if si_unit != ACCELERATION:
         raise SetupError(f"amplitudes in {unit} are no accelerations; give them in g or m/s^2, or use sine_limits")
-    points = np.asarray(list(breakpoints), dtype=np.float64).reshape(-1, 2)
-    falls = np.flatnonzero(~(np.diff(points[:, 0]) > 0))
-    if falls.size:
-        before, after = points[falls[0] : falls[0] + 2, 0]
-        raise EstimateError(f"breakpoint {after:g} Hz follows {before:g} Hz; give them in rising order, each once")
-    return SineProfile(
-        frequency_hz=points[:, 0], amplitude=points[:, 1] * factor, upper_db=upper_db, lower_db=lower_db
-    )
+    frequency_hz, amplitude = rising(breakpoints)
+    return SineProfile(frequency_hz=frequency_hz, amplitude=amplitude * factor, upper_db=upper_db, lower_db=lower_db)
 
 
 def sine_limits(
