@@ -213,197 +213,7 @@ _HOME = {
     "save_figures": "chladni.viewers.figures.saving",
 }
 
-__all__ = [
-    "DRIVES",
-    "EFFECTS",
-    "ELEMENTS",
-    "INSTRUMENTS",
-    "Album",
-    "AmplitudeSpectrum",
-    "BandLevels",
-    "Bearing",
-    "Block",
-    "Cepstrum",
-    "Channel",
-    "ChladniError",
-    "CircleFit",
-    "Clues",
-    "Coherence",
-    "CovarianceDrivenSubspace",
-    "CrossCorrelation",
-    "CrossSpectra",
-    "CrossSpectraAccumulator",
-    "Damper",
-    "DeflectionShape",
-    "DeflectionShapes",
-    "Diagnosis",
-    "EffectKind",
-    "EnhancedFrequencyDomainDecomposition",
-    "EnvelopeSpectrum",
-    "EstimateError",
-    "FilteredSeries",
-    "FrequencyDomainDecomposition",
-    "FrequencyResponse",
-    "Geometry",
-    "HalfPower",
-    "InfluenceTable",
-    "Kurtogram",
-    "LawAtPort",
-    "LevelLocation",
-    "Levels",
-    "Log",
-    "LogError",
-    "Measurement",
-    "ModalAssurance",
-    "ModePicking",
-    "ModeSet",
-    "Model",
-    "ModelError",
-    "MujocoSimulator",
-    "Multisine",
-    "OctaveLevels",
-    "OrderCuts",
-    "OrderMap",
-    "Parameter",
-    "Parameters",
-    "Peak",
-    "PolyReferenceLeastSquares",
-    "Port",
-    "PowerSpectralDensity",
-    "ProbabilityDensity",
-    "ProfileCheck",
-    "Provenance",
-    "RandomNoise",
-    "RandomProfile",
-    "Rotation",
-    "SchemeModel",
-    "SchemeOutput",
-    "SetupError",
-    "Severity",
-    "ShockResponse",
-    "Simulation",
-    "SineCheck",
-    "SineProfile",
-    "StabilisationDiagram",
-    "StructureInput",
-    "StructureModel",
-    "StructureOutput",
-    "Study",
-    "StudyResults",
-    "Terminal",
-    "TimeDelays",
-    "TimeSeries",
-    "Variant",
-    "VibrationResponse",
-    "Waterfall",
-    "Wish",
-    "amplitude_spectrum",
-    "analyse",
-    "arm_model",
-    "attached",
-    "band_rms",
-    "bandpass",
-    "bandstop",
-    "best_joint",
-    "callable_simulator",
-    "cepstrum",
-    "check_driving_point",
-    "check_linearity",
-    "check_profile",
-    "check_reciprocity",
-    "check_sine",
-    "coherence",
-    "compare_levels",
-    "convert_form",
-    "cross_correlation",
-    "cross_spectra",
-    "deflection_shape",
-    "deflection_shapes",
-    "diagnose_gap",
-    "diagnose_simulator",
-    "differentiate",
-    "differentiate_density",
-    "drive_model",
-    "element_block",
-    "envelope",
-    "excite",
-    "explained_model",
-    "explained_simulator",
-    "find_impacts",
-    "find_peaks",
-    "find_response_peaks",
-    "fit_mr_damper",
-    "force_along_motion",
-    "frf",
-    "highpass",
-    "identify_modes",
-    "impact_cross_spectra",
-    "influence",
-    "integrate",
-    "integrate_density",
-    "join_references",
-    "joint_log",
-    "kurtogram",
-    "levels",
-    "live",
-    "load_model",
-    "load_robot",
-    "load_setup",
-    "locate_from_levels",
-    "lowpass",
-    "mac",
-    "machine_harmonics",
-    "make_demo_log",
-    "merge_setups",
-    "mr_damper_at",
-    "mr_record",
-    "mujoco_simulator",
-    "notebook",
-    "octaves",
-    "open",
-    "open_log",
-    "optimise",
-    "order_cuts",
-    "order_map",
-    "partial_coherence",
-    "phase_referenced_shape",
-    "pick_modes",
-    "place_damper",
-    "plot",
-    "probability_density",
-    "psd",
-    "random_profile",
-    "read_uff_modes",
-    "relative_motion",
-    "results",
-    "robot_arm",
-    "rotation",
-    "roving_hammer",
-    "save_figures",
-    "severity",
-    "shape_transmissibility",
-    "show",
-    "simulate",
-    "sine_limits",
-    "sine_profile",
-    "srs",
-    "time_delay",
-    "transmissibility",
-    "transmissibility_along",
-    "treatments",
-    "tuned_model",
-    "unit_modal_mass_shapes",
-    "validate",
-    "vibration_response",
-    "waterfall",
-    "write_mcap",
-    "write_model",
-    "write_report",
-    "write_trajectory",
-    "write_uff",
-    "write_uff_modes",
-    "zoom_spectrum",
-]
+__all__ = list(_HOME)
 
 # What values call to be drawn and made into tables.
 _register(
@@ -417,145 +227,199 @@ _register(
 )
 
 if TYPE_CHECKING:
-    from chladni.apps.analyse import analyse
-    from chladni.apps.bench import notebook
-    from chladni.apps.demo_log import make_demo_log
-    from chladni.apps.diagnose import diagnose_gap
-    from chladni.apps.explained_model import explained_model, tuned_model
-    from chladni.apps.level_location import LevelLocation, locate_from_levels
-    from chladni.apps.live import live
-    from chladni.apps.modes import identify_modes
-    from chladni.apps.picking import ModePicking, pick_modes
-    from chladni.apps.plot import plot
-    from chladni.apps.show import show, write_report
-    from chladni.apps.spectra import frf, psd
-    from chladni.gap.comparison.levels import compare_levels
-    from chladni.gap.diagnosis.of_simulator import diagnose_simulator, explained_simulator
-    from chladni.gap.records.diagnosis import Diagnosis
-    from chladni.gap.records.measurement import Measurement
-    from chladni.gap.simulators.callable_simulator import callable_simulator
-    from chladni.gap.simulators.mujoco_simulator import MujocoSimulator, mujoco_simulator
-    from chladni.io.files.uff_modes import read_uff_modes, write_uff, write_uff_modes
-    from chladni.io.log import Log, open, open_log  # noqa: A004  # as chladni.open
-    from chladni.io.mcap.writer import write_mcap
-    from chladni.io.setup import load_setup
-    from chladni.io.study.results import StudyResults, results
-    from chladni.modal.checks.deflection_shapes import DeflectionShape, deflection_shape, phase_referenced_shape
-    from chladni.modal.checks.driving_point import check_driving_point
-    from chladni.modal.checks.linearity import check_linearity
-    from chladni.modal.checks.reciprocity import check_reciprocity
-    from chladni.modal.checks.roving import join_references, roving_hammer
-    from chladni.modal.experimental.circle_fit import CircleFit
-    from chladni.modal.experimental.half_power import HalfPower
-    from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares
-    from chladni.modal.fit.scaling import unit_modal_mass_shapes
-    from chladni.modal.operational.efdd import EnhancedFrequencyDomainDecomposition
-    from chladni.modal.operational.fdd import FrequencyDomainDecomposition
-    from chladni.modal.operational.harmonics import machine_harmonics
-    from chladni.modal.operational.setups import merge_setups
-    from chladni.modal.operational.subspace import CovarianceDrivenSubspace
-    from chladni.modal.shapes.joint_treatment import best_joint, treatments
-    from chladni.modal.shapes.mac import mac
-    from chladni.modal.shapes.relative_motion import relative_motion
-    from chladni.modal.shapes.shape_transmissibility import shape_transmissibility
-    from chladni.modal.shapes.validation import validate
-    from chladni.models.analysis.damper_placement import Damper, place_damper
-    from chladni.models.analysis.influence import influence
-    from chladni.models.analysis.optimise import optimise
-    from chladni.models.analysis.wish import Wish
-    from chladni.models.core.model import Model
-    from chladni.models.core.parameter import Parameter, Parameters
-    from chladni.models.core.port import Port, Terminal
-    from chladni.models.core.reading import InfluenceTable
-    from chladni.models.core.simulation import Simulation
-    from chladni.models.drives.catalogue import DRIVES
-    from chladni.models.drives.drive_model import drive_model
-    from chladni.models.drives.mr_damper import mr_damper_at
-    from chladni.models.drives.mr_damper_fit import fit_mr_damper
-    from chladni.models.drives.mr_record import mr_record
-    from chladni.models.effects.attached_effect import attached
-    from chladni.models.effects.attaching import LawAtPort
-    from chladni.models.effects.catalogue import CATALOGUE as EFFECTS
-    from chladni.models.effects.clues import Clues
-    from chladni.models.effects.effect_kind import EffectKind, Variant
-    from chladni.models.elements.catalogue import ELEMENTS
-    from chladni.models.excitations.multisine import Multisine
-    from chladni.models.excitations.random_noise import RandomNoise
-    from chladni.models.files.model_file import load_model, write_model
-    from chladni.models.instruments.catalogue import INSTRUMENTS
-    from chladni.models.instruments.robot_arm import arm_model
-    from chladni.models.integrator.known_motion import force_along_motion
-    from chladni.models.integrator.simulate import simulate
-    from chladni.models.schemes.block import Block, element_block
-    from chladni.models.schemes.scheme_model import SchemeModel
-    from chladni.models.schemes.scheme_output import SchemeOutput
-    from chladni.models.structures.robot_arm import robot_arm
-    from chladni.models.structures.structure_input import StructureInput
-    from chladni.models.structures.structure_model import StructureModel
-    from chladni.models.structures.structure_output import StructureOutput
-    from chladni.robots.excite import excite
-    from chladni.robots.joint_log import joint_log
-    from chladni.robots.loading import load_robot
-    from chladni.robots.trajectory import write_trajectory
-    from chladni.signals.cepstrum import Cepstrum
-    from chladni.signals.channel import Channel
-    from chladni.signals.coherence import Coherence
-    from chladni.signals.cross_correlation import CrossCorrelation, TimeDelays
-    from chladni.signals.cross_spectra import CrossSpectra
-    from chladni.signals.deflection_shapes import DeflectionShapes
-    from chladni.signals.envelope import Bearing, EnvelopeSpectrum, Kurtogram
-    from chladni.signals.errors import ChladniError, EstimateError, LogError, ModelError, SetupError
-    from chladni.signals.filtered_series import FilteredSeries
-    from chladni.signals.frequency_response import FrequencyResponse
-    from chladni.signals.geometry import Geometry
-    from chladni.signals.levels import BandLevels, Levels, OctaveLevels, Severity
-    from chladni.signals.modal_assurance import ModalAssurance
-    from chladni.signals.mode_set import ModeSet
-    from chladni.signals.order_spectra import OrderCuts, OrderMap
-    from chladni.signals.peak import Peak
-    from chladni.signals.power_spectral_density import PowerSpectralDensity
-    from chladni.signals.provenance import Provenance
-    from chladni.signals.random_vibration import ProbabilityDensity, ProfileCheck, RandomProfile, VibrationResponse
-    from chladni.signals.rotation import Rotation
-    from chladni.signals.shock_response import ShockResponse
-    from chladni.signals.sine_vibration import SineCheck, SineProfile
-    from chladni.signals.stabilisation_diagram import StabilisationDiagram
-    from chladni.signals.study import Study
-    from chladni.signals.time_series import TimeSeries
-    from chladni.signals.waterfall import Waterfall
-    from chladni.spectral.accumulator import CrossSpectraAccumulator
-    from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum, amplitude_spectrum
-    from chladni.spectral.bands import band_rms
-    from chladni.spectral.cepstrum import cepstrum
-    from chladni.spectral.coherence import coherence, partial_coherence
-    from chladni.spectral.cross_spectra import cross_spectra
-    from chladni.spectral.deflection import deflection_shapes
-    from chladni.spectral.delay import cross_correlation, time_delay
-    from chladni.spectral.envelope import envelope
-    from chladni.spectral.filters import bandpass, bandstop, highpass, lowpass
-    from chladni.spectral.forms import convert_form
-    from chladni.spectral.impact import find_impacts, impact_cross_spectra
-    from chladni.spectral.integration import differentiate, differentiate_density, integrate, integrate_density
-    from chladni.spectral.kurtogram import kurtogram
-    from chladni.spectral.levels import levels
-    from chladni.spectral.octaves import octaves
-    from chladni.spectral.orders import order_cuts, order_map
-    from chladni.spectral.peaks import find_peaks, find_response_peaks
-    from chladni.spectral.random_vibration import (
-        check_profile,
-        probability_density,
-        random_profile,
-        vibration_response,
+    from chladni.apps.analyse import analyse as analyse
+    from chladni.apps.bench import notebook as notebook
+    from chladni.apps.demo_log import make_demo_log as make_demo_log
+    from chladni.apps.diagnose import diagnose_gap as diagnose_gap
+    from chladni.apps.explained_model import explained_model as explained_model
+    from chladni.apps.explained_model import tuned_model as tuned_model
+    from chladni.apps.level_location import LevelLocation as LevelLocation
+    from chladni.apps.level_location import locate_from_levels as locate_from_levels
+    from chladni.apps.live import live as live
+    from chladni.apps.modes import identify_modes as identify_modes
+    from chladni.apps.picking import ModePicking as ModePicking
+    from chladni.apps.picking import pick_modes as pick_modes
+    from chladni.apps.plot import plot as plot
+    from chladni.apps.show import show as show
+    from chladni.apps.show import write_report as write_report
+    from chladni.apps.spectra import frf as frf
+    from chladni.apps.spectra import psd as psd
+    from chladni.gap.comparison.levels import compare_levels as compare_levels
+    from chladni.gap.diagnosis.of_simulator import diagnose_simulator as diagnose_simulator
+    from chladni.gap.diagnosis.of_simulator import explained_simulator as explained_simulator
+    from chladni.gap.records.diagnosis import Diagnosis as Diagnosis
+    from chladni.gap.records.measurement import Measurement as Measurement
+    from chladni.gap.simulators.callable_simulator import callable_simulator as callable_simulator
+    from chladni.gap.simulators.mujoco_simulator import MujocoSimulator as MujocoSimulator
+    from chladni.gap.simulators.mujoco_simulator import mujoco_simulator as mujoco_simulator
+    from chladni.io.files.uff_modes import read_uff_modes as read_uff_modes
+    from chladni.io.files.uff_modes import write_uff as write_uff
+    from chladni.io.files.uff_modes import write_uff_modes as write_uff_modes
+    from chladni.io.log import Log as Log
+    from chladni.io.log import open as open  # noqa: A004  # as chladni.open
+    from chladni.io.log import open_log as open_log
+    from chladni.io.mcap.writer import write_mcap as write_mcap
+    from chladni.io.setup import load_setup as load_setup
+    from chladni.io.study.results import StudyResults as StudyResults
+    from chladni.io.study.results import results as results
+    from chladni.modal.checks.deflection_shapes import DeflectionShape as DeflectionShape
+    from chladni.modal.checks.deflection_shapes import deflection_shape as deflection_shape
+    from chladni.modal.checks.deflection_shapes import phase_referenced_shape as phase_referenced_shape
+    from chladni.modal.checks.driving_point import check_driving_point as check_driving_point
+    from chladni.modal.checks.linearity import check_linearity as check_linearity
+    from chladni.modal.checks.reciprocity import check_reciprocity as check_reciprocity
+    from chladni.modal.checks.roving import join_references as join_references
+    from chladni.modal.checks.roving import roving_hammer as roving_hammer
+    from chladni.modal.experimental.circle_fit import CircleFit as CircleFit
+    from chladni.modal.experimental.half_power import HalfPower as HalfPower
+    from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares as PolyReferenceLeastSquares
+    from chladni.modal.fit.scaling import unit_modal_mass_shapes as unit_modal_mass_shapes
+    from chladni.modal.operational.efdd import (
+        EnhancedFrequencyDomainDecomposition as EnhancedFrequencyDomainDecomposition,
     )
-    from chladni.spectral.rotation import rotation
-    from chladni.spectral.severity import severity
-    from chladni.spectral.shock import srs
-    from chladni.spectral.sine_vibration import check_sine, sine_limits, sine_profile
-    from chladni.spectral.transmissibility import transmissibility, transmissibility_along
-    from chladni.spectral.waterfall import waterfall
-    from chladni.spectral.zoom import zoom_spectrum
-    from chladni.viewers.figures.album import Album
-    from chladni.viewers.figures.saving import save_figures
+    from chladni.modal.operational.fdd import FrequencyDomainDecomposition as FrequencyDomainDecomposition
+    from chladni.modal.operational.harmonics import machine_harmonics as machine_harmonics
+    from chladni.modal.operational.setups import merge_setups as merge_setups
+    from chladni.modal.operational.subspace import CovarianceDrivenSubspace as CovarianceDrivenSubspace
+    from chladni.modal.shapes.joint_treatment import best_joint as best_joint
+    from chladni.modal.shapes.joint_treatment import treatments as treatments
+    from chladni.modal.shapes.mac import mac as mac
+    from chladni.modal.shapes.relative_motion import relative_motion as relative_motion
+    from chladni.modal.shapes.shape_transmissibility import shape_transmissibility as shape_transmissibility
+    from chladni.modal.shapes.validation import validate as validate
+    from chladni.models.analysis.damper_placement import Damper as Damper
+    from chladni.models.analysis.damper_placement import place_damper as place_damper
+    from chladni.models.analysis.influence import influence as influence
+    from chladni.models.analysis.optimise import optimise as optimise
+    from chladni.models.analysis.wish import Wish as Wish
+    from chladni.models.core.model import Model as Model
+    from chladni.models.core.parameter import Parameter as Parameter
+    from chladni.models.core.parameter import Parameters as Parameters
+    from chladni.models.core.port import Port as Port
+    from chladni.models.core.port import Terminal as Terminal
+    from chladni.models.core.reading import InfluenceTable as InfluenceTable
+    from chladni.models.core.simulation import Simulation as Simulation
+    from chladni.models.drives.catalogue import DRIVES as DRIVES
+    from chladni.models.drives.drive_model import drive_model as drive_model
+    from chladni.models.drives.mr_damper import mr_damper_at as mr_damper_at
+    from chladni.models.drives.mr_damper_fit import fit_mr_damper as fit_mr_damper
+    from chladni.models.drives.mr_record import mr_record as mr_record
+    from chladni.models.effects.attached_effect import attached as attached
+    from chladni.models.effects.attaching import LawAtPort as LawAtPort
+    from chladni.models.effects.catalogue import CATALOGUE
+    from chladni.models.effects.clues import Clues as Clues
+    from chladni.models.effects.effect_kind import EffectKind as EffectKind
+    from chladni.models.effects.effect_kind import Variant as Variant
+    from chladni.models.elements.catalogue import ELEMENTS as ELEMENTS
+    from chladni.models.excitations.multisine import Multisine as Multisine
+    from chladni.models.excitations.random_noise import RandomNoise as RandomNoise
+    from chladni.models.files.model_file import load_model as load_model
+    from chladni.models.files.model_file import write_model as write_model
+    from chladni.models.instruments.catalogue import INSTRUMENTS as INSTRUMENTS
+    from chladni.models.instruments.robot_arm import arm_model as arm_model
+    from chladni.models.integrator.known_motion import force_along_motion as force_along_motion
+    from chladni.models.integrator.simulate import simulate as simulate
+    from chladni.models.schemes.block import Block as Block
+    from chladni.models.schemes.block import element_block as element_block
+    from chladni.models.schemes.scheme_model import SchemeModel as SchemeModel
+    from chladni.models.schemes.scheme_output import SchemeOutput as SchemeOutput
+    from chladni.models.structures.robot_arm import robot_arm as robot_arm
+    from chladni.models.structures.structure_input import StructureInput as StructureInput
+    from chladni.models.structures.structure_model import StructureModel as StructureModel
+    from chladni.models.structures.structure_output import StructureOutput as StructureOutput
+    from chladni.robots.excite import excite as excite
+    from chladni.robots.joint_log import joint_log as joint_log
+    from chladni.robots.loading import load_robot as load_robot
+    from chladni.robots.trajectory import write_trajectory as write_trajectory
+    from chladni.signals.cepstrum import Cepstrum as Cepstrum
+    from chladni.signals.channel import Channel as Channel
+    from chladni.signals.coherence import Coherence as Coherence
+    from chladni.signals.cross_correlation import CrossCorrelation as CrossCorrelation
+    from chladni.signals.cross_correlation import TimeDelays as TimeDelays
+    from chladni.signals.cross_spectra import CrossSpectra as CrossSpectra
+    from chladni.signals.deflection_shapes import DeflectionShapes as DeflectionShapes
+    from chladni.signals.envelope import Bearing as Bearing
+    from chladni.signals.envelope import EnvelopeSpectrum as EnvelopeSpectrum
+    from chladni.signals.envelope import Kurtogram as Kurtogram
+    from chladni.signals.errors import ChladniError as ChladniError
+    from chladni.signals.errors import EstimateError as EstimateError
+    from chladni.signals.errors import LogError as LogError
+    from chladni.signals.errors import ModelError as ModelError
+    from chladni.signals.errors import SetupError as SetupError
+    from chladni.signals.filtered_series import FilteredSeries as FilteredSeries
+    from chladni.signals.frequency_response import FrequencyResponse as FrequencyResponse
+    from chladni.signals.geometry import Geometry as Geometry
+    from chladni.signals.levels import BandLevels as BandLevels
+    from chladni.signals.levels import Levels as Levels
+    from chladni.signals.levels import OctaveLevels as OctaveLevels
+    from chladni.signals.levels import Severity as Severity
+    from chladni.signals.modal_assurance import ModalAssurance as ModalAssurance
+    from chladni.signals.mode_set import ModeSet as ModeSet
+    from chladni.signals.order_spectra import OrderCuts as OrderCuts
+    from chladni.signals.order_spectra import OrderMap as OrderMap
+    from chladni.signals.peak import Peak as Peak
+    from chladni.signals.power_spectral_density import PowerSpectralDensity as PowerSpectralDensity
+    from chladni.signals.provenance import Provenance as Provenance
+    from chladni.signals.random_vibration import ProbabilityDensity as ProbabilityDensity
+    from chladni.signals.random_vibration import ProfileCheck as ProfileCheck
+    from chladni.signals.random_vibration import RandomProfile as RandomProfile
+    from chladni.signals.random_vibration import VibrationResponse as VibrationResponse
+    from chladni.signals.rotation import Rotation as Rotation
+    from chladni.signals.shock_response import ShockResponse as ShockResponse
+    from chladni.signals.sine_vibration import SineCheck as SineCheck
+    from chladni.signals.sine_vibration import SineProfile as SineProfile
+    from chladni.signals.stabilisation_diagram import StabilisationDiagram as StabilisationDiagram
+    from chladni.signals.study import Study as Study
+    from chladni.signals.time_series import TimeSeries as TimeSeries
+    from chladni.signals.waterfall import Waterfall as Waterfall
+    from chladni.spectral.accumulator import CrossSpectraAccumulator as CrossSpectraAccumulator
+    from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum as AmplitudeSpectrum
+    from chladni.spectral.amplitude_spectrum import amplitude_spectrum as amplitude_spectrum
+    from chladni.spectral.bands import band_rms as band_rms
+    from chladni.spectral.cepstrum import cepstrum as cepstrum
+    from chladni.spectral.coherence import coherence as coherence
+    from chladni.spectral.coherence import partial_coherence as partial_coherence
+    from chladni.spectral.cross_spectra import cross_spectra as cross_spectra
+    from chladni.spectral.deflection import deflection_shapes as deflection_shapes
+    from chladni.spectral.delay import cross_correlation as cross_correlation
+    from chladni.spectral.delay import time_delay as time_delay
+    from chladni.spectral.envelope import envelope as envelope
+    from chladni.spectral.filters import bandpass as bandpass
+    from chladni.spectral.filters import bandstop as bandstop
+    from chladni.spectral.filters import highpass as highpass
+    from chladni.spectral.filters import lowpass as lowpass
+    from chladni.spectral.forms import convert_form as convert_form
+    from chladni.spectral.impact import find_impacts as find_impacts
+    from chladni.spectral.impact import impact_cross_spectra as impact_cross_spectra
+    from chladni.spectral.integration import differentiate as differentiate
+    from chladni.spectral.integration import differentiate_density as differentiate_density
+    from chladni.spectral.integration import integrate as integrate
+    from chladni.spectral.integration import integrate_density as integrate_density
+    from chladni.spectral.kurtogram import kurtogram as kurtogram
+    from chladni.spectral.levels import levels as levels
+    from chladni.spectral.octaves import octaves as octaves
+    from chladni.spectral.orders import order_cuts as order_cuts
+    from chladni.spectral.orders import order_map as order_map
+    from chladni.spectral.peaks import find_peaks as find_peaks
+    from chladni.spectral.peaks import find_response_peaks as find_response_peaks
+    from chladni.spectral.random_vibration import check_profile as check_profile
+    from chladni.spectral.random_vibration import probability_density as probability_density
+    from chladni.spectral.random_vibration import random_profile as random_profile
+    from chladni.spectral.random_vibration import vibration_response as vibration_response
+    from chladni.spectral.rotation import rotation as rotation
+    from chladni.spectral.severity import severity as severity
+    from chladni.spectral.shock import srs as srs
+    from chladni.spectral.sine_vibration import check_sine as check_sine
+    from chladni.spectral.sine_vibration import sine_limits as sine_limits
+    from chladni.spectral.sine_vibration import sine_profile as sine_profile
+    from chladni.spectral.transmissibility import transmissibility as transmissibility
+    from chladni.spectral.transmissibility import transmissibility_along as transmissibility_along
+    from chladni.spectral.waterfall import waterfall as waterfall
+    from chladni.spectral.zoom import zoom_spectrum as zoom_spectrum
+    from chladni.viewers.figures.album import Album as Album
+    from chladni.viewers.figures.saving import save_figures as save_figures
+
+    EFFECTS = CATALOGUE
 else:
 
     def __getattr__(name: str) -> object:
