@@ -1,6 +1,7 @@
 """An MCAP log: channels decoded as they are asked for, in memory that doesn't grow with the log."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
@@ -57,11 +58,10 @@ def open_mcap(
     log = McapLog(container, setup=setup, stamp=stamp, sample_rate_hz=sample_rate_hz)
     if setup.channels or setup.batches:
         # A setup file that doesn't fit the log is better told now than after an hour of averaging.
-        try:
+        with ExitStack() as refused:
+            refused.callback(container.close)
             _ = log.channels
-        except BaseException:
-            container.close()
-            raise
+            refused.pop_all()
     return log
 
 

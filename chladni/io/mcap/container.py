@@ -1,6 +1,7 @@
 """An MCAP log as channels and batches of still encoded messages."""
 
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import ExitStack
 from itertools import accumulate
 from pathlib import Path
 from types import MappingProxyType, TracebackType
@@ -84,7 +85,8 @@ class McapContainer:
         """
         limits = limits or Limits()
         file = LogFile(Path(path))
-        try:
+        with ExitStack() as refused:
+            refused.callback(file.close)
             damage, registry = DamageList(), ChannelRegistry(limits)
             end = read_log_end(file, registry, damage, limits=limits, check_crc=check_crc)
             # What a whole summary defines holds even where it doesn't list all.
@@ -94,9 +96,7 @@ class McapContainer:
             container._take_stock()
             if container.damage:
                 file.require_lone_line_feeds()
-        except BaseException:
-            file.close()
-            raise
+            refused.pop_all()
         return container
 
     def _take_stock(self) -> None:
