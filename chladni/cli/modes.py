@@ -9,7 +9,6 @@ from chladni.cli import options
 from chladni.cli.mode_rows import print_modes, print_relative_motion
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 
 if TYPE_CHECKING:
     from chladni.apps.modal_study import ModalStudy
@@ -50,73 +49,49 @@ def modes(
     port: Annotated[int, typer.Option(metavar="N", help="Port of that page; 0 takes a free one.")] = 0,
     open_page: Annotated[bool, typer.Option("--open/--no-open", help="Open that page in the browser.")] = True,
     resolution: options.Resolution = None,
-    start: options.Start = None,
-    end: options.End = None,
+    part: options.Part,
     join: options.Join = "auto",
     opener: Opener,
-    json: options.Json = None,
+    targets: options.Targets,
     uff: Annotated[
         Path | None,
         typer.Option(metavar="FILE.uff", help="Write shapes, points and functions as UFF.", show_default=False),
     ] = None,
-    csv: Annotated[
-        Path | None, typer.Option(metavar="FILE.csv", help="Write modes and shapes as a table.", show_default=False)
-    ] = None,
     save: Annotated[
         Path | None, typer.Option(metavar="OUT.rrd", help="Write a rerun recording.", show_default=False)
     ] = None,
-    figures: options.Figures = None,
-    report: options.Report = None,
 ) -> None:
     """Natural frequencies, damping ratios and modal vectors, with their uncertainty."""
     from chladni.apps.modal_study import modal_study
     from chladni.apps.modes import Wanted
     from chladni.apps.modes_document import modes_document
-    from chladni.apps.sources import Span
 
-    require_places(
-        reads=[log, opener.setup],
-        writes={"--json": json, "--uff": uff, "--csv": csv, "--save": save, "--report": report},
-        folders={"--figures": figures},
-    )
-    out = Output(json)
+    out = targets.output([log, opener.setup], others={"--uff": uff, "--save": save})
     wanted = Wanted.of(bands_hz=None if band is None else [band], count=count, frequencies_hz=frequency)
-    span = Span(start_s=start, end_s=end, join=join)
+    given: dict[str, Any] = {
+        "references": reference, "operational": operational, "channels": channel, "method": method,
+        "resolution_hz": resolution, "span": part.span(join=join),
+    }  # fmt: skip
     with opener(log) as opened:
         if pick:
-            picking = _picking(
-                out, opened, references=reference, operational=operational, channels=channel, method=method,
-                wanted=wanted, resolution_hz=resolution, span=span,
-            )  # fmt: skip
+            picking = _picking(out, opened, wanted=wanted, **given)
             wanted = _kept(out, picking, wanted, port=port, open_page=open_page)
         with out.progress(log.name) as progress:
-            found = modal_study(
-                opened,
-                references=reference,
-                operational=operational,
-                channels=channel,
-                method=method,
-                wanted=wanted,
-                resolution_hz=resolution,
-                span=span,
-                progress=progress,
-            )
+            found = modal_study(opened, wanted=wanted, progress=progress, **given)
     print_modes(out, found.modes, found.validation)
     print_relative_motion(out, found.modes, found.study.relative_motion)
     out.lines(found.study.findings)
-    _write(out, found, uff=uff, csv=csv, save=save)
-    out.pictures(found.study, figures=figures, report=report)
+    _write(out, found, uff=uff, save=save)
+    out.pictures(found.study, figures=targets.figures, report=targets.report)
     motions, passed_on = found.study.relative_motion, found.transmissibility
     out.json(modes_document(found.modes, found.validation, motions, passed_on))
 
 
-def _picking(
-    out: Output, log: "OpenedLog", *, references: list[str] | None, channels: list[str] | None, **options: Any
-) -> "ModePicking":
+def _picking(out: Output, log: "OpenedLog", **given: Any) -> "ModePicking":
     from chladni.apps.modal_study import picking_study
 
     with out.progress(log.path.name) as progress:
-        return picking_study(log, references=references, channels=channels, progress=progress, **options)
+        return picking_study(log, progress=progress, **given)
 
 
 def _kept(out: Output, picking: "ModePicking", wanted: "Wanted", *, port: int, open_page: bool) -> "Wanted":
@@ -141,17 +116,13 @@ def _kept(out: Output, picking: "ModePicking", wanted: "Wanted", *, port: int, o
     return replace(wanted, count=None, frequencies_hz=picking.frequencies_hz)
 
 
-def _write(out: Output, found: "ModalStudy", *, uff: Path | None, csv: Path | None, save: Path | None) -> None:
+def _write(out: Output, found: "ModalStudy", *, uff: Path | None, save: Path | None) -> None:
     if uff is not None:
         from chladni.io.files.uff_modes import write_uff_modes
 
         out.lines(write_uff_modes(uff, found.modes, geometry=found.study.geometry, response=found.study.response))
         out.line(f"universal file: {uff}")
-    if csv is not None:
-        from chladni.io.files.modes_table import write_modes_csv
-
-        for path in write_modes_csv(csv, found.modes, validation=found.validation):
-            out.line(f"table: {path}")
+    out.csv([found.modes] if out.csv_streams else [found.modes, found.validation])
     if save is not None:
         from chladni.viewers.rerun import write_rrd
 

@@ -60,9 +60,11 @@ class ModeSet(Value):
 
     AXES: ClassVar = {
         **dict.fromkeys(("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std"), ("mode",)),
+        **dict.fromkeys(("modal_mass", "modal_mass_std"), ("mode",)),
         **dict.fromkeys(("shapes", "shape_std"), ("mode", "channels")),
     }
     ROWS: ClassVar = "mode"
+    UNITS: ClassVar = dict.fromkeys(("modal_mass", "modal_mass_std"), "kg")
 
     frequency_hz: Real
     frequency_std_hz: Real
@@ -157,6 +159,16 @@ class ModeSet(Value):
     def coordinate(self, axis: str) -> Coordinate:
         """Give the modes' numbers from 1 on, or the names of the channels."""
         return np.arange(1, self.frequency_hz.size + 1) if axis == "mode" else Value.coordinate(self, axis)
+
+    @property
+    def modal_mass(self) -> Real:
+        """``[mode]`` modal mass of `scale`, kg for forces and translations; NaN where there is none."""
+        return np.full(self.frequency_hz.shape, np.nan) if self.scale is None else self.scale.modal_mass
+
+    @property
+    def modal_mass_std(self) -> Real:
+        """``[mode]`` one sigma of the modal mass; NaN where there is none."""
+        return np.full(self.frequency_hz.shape, np.nan) if self.scale is None else self.scale.modal_mass_std
 
     @property
     def poles(self) -> Complex:

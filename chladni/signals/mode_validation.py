@@ -1,9 +1,12 @@
 """What tells whether modes can be trusted."""
 
 from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
 
 from chladni.signals.arrays import Real
-from chladni.signals.value import Value, require_shape
+from chladni.signals.value import Coordinate, Value, require_shape
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,6 +30,9 @@ class ModeValidation(Value):
         Sentences for whoever must rely on the modes, the gravest first.
     """
 
+    AXES: ClassVar = dict.fromkeys(("mpc", "mpd_deg", "mean_phase_deg"), ("mode",))
+    ROWS: ClassVar = "mode"
+
     auto_mac: Real
     mpc: Real
     mpd_deg: Real
@@ -39,3 +45,7 @@ class ModeValidation(Value):
         for name in ("mpd_deg", "mean_phase_deg"):
             require_shape(name, getattr(self, name), self.mpc.shape, "modes")
         self._freeze()
+
+    def coordinate(self, axis: str) -> Coordinate:
+        """Give the modes' numbers from 1 on."""
+        return np.arange(1, self.mpc.size + 1) if axis == "mode" else Value.coordinate(self, axis)

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
+import chladni
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
@@ -115,3 +117,27 @@ def test_a_second_table_replaces_nothing_that_is_read(run: Run, two_grids: Path,
     assert "is read by this command, and table 2 of --csv would replace it" in refused.err
     assert log.read_bytes() == kept
     assert not (tmp_path / "a.mcap").exists()
+
+
+def test_modes_are_the_table_that_the_value_gives(run: Run, tmp_path: Path) -> None:
+    channels = (Channel(name=FORCE, unit="N"), Channel(name=TIP, unit="m/s^2"))
+    force = np.random.default_rng(3).standard_normal(8000)
+    pole = 0.98 * np.exp(2j * np.pi * 20 / RATE_HZ)
+    tip = lfilter([1.0, -2.0, 1.0], np.poly([pole, pole.conjugate()]).real, force)
+    tip += 1e-3 * np.random.default_rng(4).standard_normal(8000)
+    write_mcap(
+        TimeSeries(values=np.stack([force, tip]), sample_rate_hz=RATE_HZ, channels=channels), tmp_path / "m.mcap"
+    )
+    log = tmp_path / "m.mcap"
+    outcome = run("modes", log, "--reference", FORCE, "--csv", tmp_path / "a.csv", "--json", "-")
+    assert outcome.code == 0, outcome.err
+    table, found = columns((tmp_path / "a.csv").read_text()), outcome.document["modes"]
+    assert found
+    assert numbers(table["mode"]) == [one + 1 for one in range(len(found))]
+    assert numbers(table["frequency_hz"]) == [one["frequency_hz"] for one in found]
+    assert numbers(table[f"{TIP} shapes real"]) == [one["shape"][0]["real"] for one in found]
+    checks = columns((tmp_path / "a_2.csv").read_text())
+    assert checks.keys() == {"mode", "mpc", "mpd_deg", "mean_phase_deg"}
+    chladni.identify_modes(log, references=FORCE).to_csv(tmp_path / "python.csv")
+    assert (tmp_path / "python.csv").read_bytes() == (tmp_path / "a.csv").read_bytes()
+    assert run("modes", log, "--reference", FORCE, "--csv", "-").out == (tmp_path / "a.csv").read_bytes().decode()

@@ -221,7 +221,7 @@ def _texts(value: Any) -> Iterator[str]:
 
 
 def _require_tables(folder: Path) -> None:
-    for path in (folder / "to.csv", folder / "m_shapes.csv"):
+    for path in (folder / "to.csv", folder / "m.csv"):
         lines = path.read_text(encoding="utf-8").splitlines()
         cells = [cell for row in csv.reader(lines) for cell in row]
         assert any("forged" in cell for cell in cells)

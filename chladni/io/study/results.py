@@ -1,8 +1,10 @@
 """What a study found: its tables, and SQL over them by DuckDB, which sees nothing else."""
 
-from collections.abc import Mapping
+import csv
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -10,7 +12,6 @@ import pyarrow as pa
 from pyarrow import dataset as datasets
 
 from chladni.io.atomic import atomic_path
-from chladni.io.files.modes_table import number_text, write_table
 from chladni.io.study.folder import require_study
 from chladni.io.study.tables import ORDER, SCHEMAS
 from chladni.signals.errors import EstimateError, LogError, SetupError
@@ -176,7 +177,9 @@ def write_answer(path: Path, answer: pa.Table) -> Path:
         When the file can't be written.
     """
     with atomic_path(path) as place:
-        write_table(place, answer.schema.names, ([_field(one) for one in row.values()] for row in plain_rows(answer)))
+        _write_table(
+            place, answer.schema.names, ([_field(one) for one in row.values()] for row in plain_rows(answer))
+        )
     return path
 
 
@@ -184,5 +187,18 @@ def _field(value: Any) -> str:
     if isinstance(value, list):
         return " ".join(map(_field, value))
     if isinstance(value, float):
-        return number_text(value)
+        return _number_text(value)
     return "" if value is None else cell_text(str(value))
+
+
+def _write_table(path: Path, columns: Sequence[str], rows: Iterable[list[str]]) -> None:
+    """Write a table as RFC 4180 has it, one header line first."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
+def _number_text(number: float) -> str:
+    """Give a number with all its digits, nothing where it isn't known."""
+    return f"{float(number):.17g}" if isfinite(number) else ""
