@@ -69,7 +69,7 @@ def show(*items: Shown, save: Path | str | None = None) -> None:
         rerun.write_rrd(study, save)
 
 
-def write_report(item: Shown, path: Path | str) -> Path:
+def write_report(item: Shown, path: Path | str, *, interactive: bool | None = None) -> Path:
     """Write what was found as one HTML file that needs nothing else.
 
     Parameters
@@ -78,6 +78,8 @@ def write_report(item: Shown, path: Path | str) -> Path:
         A diagnosis; or a study, a log or the path to one, which is analysed first, or any value.
     path
         File to write; one that exists is replaced.
+    interactive
+        Whether plots zoom and read out, which takes Bokeh; None for where it's installed. Else they are pictures.
 
     Returns
     -------
@@ -86,16 +88,18 @@ def write_report(item: Shown, path: Path | str) -> Path:
 
     Raises
     ------
+    SetupError
+        When plots are asked for, and Bokeh isn't installed.
     LogError
         When the file can't be written, or the log can't be read.
     """
     if isinstance(item, Diagnosis):
         from chladni.viewers.report.gap import write_gap_report
 
-        return write_gap_report(gap_evidence(item), path)
+        return write_gap_report(gap_evidence(item), path, interactive=interactive)
     from chladni.viewers import report
 
-    return report.write_report(gather(item), path)
+    return report.write_report(gather(item), path, interactive=interactive)
 
 
 def gather(*items: Shown) -> Study:

@@ -24,28 +24,23 @@ def cepstrum(
         Literal["real", "power"], typer.Option(help="Of ln abs(X), or the square of that of its power.")
     ] = "real",
     resolution: options.Resolution = None,
-    start: options.Start = None,
-    end: options.End = None,
+    part: options.Part,
     opener: Opener,
-    json: options.Json = None,
-    csv: options.Csv = None,
-    figures: options.Figures = None,
-    report: options.Report = None,
+    targets: options.Targets,
 ) -> None:
     """Cepstrum: echoes, and families of harmonics or sidebands, as one peak each."""
     from chladni.apps.cepstrum import cepstrum_document, measure_cepstra
     from chladni.apps.findings import reading_sentences
-    from chladni.apps.sources import Span
     from chladni.signals.study import Study
 
-    out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures, report=report)
+    out = targets.output([log, opener.setup])
     with opener(log) as opened, out.progress(log.name) as progress:
         found = measure_cepstra(
             opened,
             channels=channel,
             kind=kind,
             resolution_hz=resolution,
-            span=Span(start_s=start, end_s=end),
+            span=part.span(),
             progress=progress,
         )
         told = reading_sentences(opened, everything=channel is None)
@@ -54,7 +49,7 @@ def cepstrum(
     out.lines((*told, *found.notes))
     study = Study(title=log.name, cepstra=found.cepstra, findings=(*told, *found.notes))
     out.csv(found.cepstra)
-    out.pictures(study, figures=figures, report=report)
+    out.pictures(study, figures=targets.figures, report=targets.report)
     out.json(cepstrum_document(found))
 
 

@@ -41,6 +41,7 @@ def compare(
     json: options.Json = None,
     figures: options.Figures = None,
     report: options.Report = None,
+    static: options.Static = False,
 ) -> None:
     """Levels, spectra, transfer functions and modes of two logs side by side, with what is significant."""
     from chladni.apps.compare import compare_logs
@@ -48,7 +49,7 @@ def compare(
 
     twice = before.resolve() == after.resolve()
     titles = tuple(f"{before.name}, {when}" for when in ("before", "after")) if twice else log_names([before, after])
-    out = Output.of_log([before, after, opener.setup], json=json, figures=figures, report=report)
+    out = Output.of_log([before, after, opener.setup], json=json, figures=figures, report=report, static=static)
     opening = opener.among([before, after])
     with (
         opening(before) as old,

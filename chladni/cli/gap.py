@@ -96,6 +96,7 @@ def gap(
     opener: Opener,
     json: options.Json = None,
     report: Report = None,
+    static: options.Static = False,
     figure: Sheet = None,
     figures: options.Figures = None,
     save: Recording = None,
@@ -108,8 +109,9 @@ def gap(
 ) -> None:
     """Where a model and a log disagree, which effect was left out, and how far the gap closes with it."""
     wanted = _Wanted(
-        json=json, report=report, figure=figure, figures=figures, save=save, web=web, write_model=write_model
-    )
+        json=json, report=report, static=static, figure=figure, figures=figures, save=save, web=web,
+        write_model=write_model,
+    )  # fmt: skip
     # A diagnosis takes its time: it shouldn't be lost to a misspelt folder.
     from chladni.apps.sources import Span
 
@@ -141,6 +143,7 @@ class _Wanted:
 
     json: str | None
     report: Path | None
+    static: bool
     figure: Path | None
     figures: Path | None
     save: Path | None
@@ -153,6 +156,10 @@ class _Wanted:
             from chladni.signals.errors import SetupError
 
             raise SetupError("--save writes a file and --web serves a page; give one of them")
+        if self.static and self.report is None:
+            from chladni.signals.errors import SetupError
+
+            raise SetupError("--static says how a report looks; ask for one (--report FILE.html)")
         require_places(
             reads=reads, writes={"--json": self.json, **self._files()}, folders={"--figures": self.figures}
         )
@@ -163,6 +170,11 @@ class _Wanted:
             "--figure": self.figure, "--save": self.save, "--web": self.web or None, "--write-model": self.write_model
         }  # fmt: skip
         return [name for name, asked in given.items() if asked is not None]
+
+    @property
+    def interactive(self) -> bool | None:
+        """Whether the report's plots zoom; None for where Bokeh is installed."""
+        return False if self.static else None
 
     def _files(self) -> dict[str, Path | None]:
         return {
@@ -348,7 +360,9 @@ def _draw_comparisons(
     if wanted.report is not None:
         from chladni.viewers.report.log_gap import write_log_gap_report
 
-        write_log_gap_report(list(zip(evidence, albums, strict=True)), wanted.report, levels=levels)
+        write_log_gap_report(
+            list(zip(evidence, albums, strict=True)), wanted.report, levels=levels, interactive=wanted.interactive
+        )
         out.line(f"report: {wanted.report}")
 
 
@@ -359,7 +373,7 @@ def _draw(out: Output, found: "Diagnosis", model: "Model | Robot", wanted: _Want
     from chladni.apps.gap_evidence import gap_evidence
 
     evidence = gap_evidence(found)
-    _draw_album(out, evidence, report=wanted.report, figures=wanted.figures)
+    _draw_album(out, evidence, wanted)
     if wanted.figure is not None:
         from chladni.viewers.figures.gap_sheet import save_gap_sheet
 
@@ -401,7 +415,8 @@ def _scene(found: "Diagnosis") -> "RobotScene | None":
     return robot_scene(found)
 
 
-def _draw_album(out: Output, evidence: "GapEvidence", *, report: Path | None, figures: Path | None) -> None:
+def _draw_album(out: Output, evidence: "GapEvidence", wanted: _Wanted) -> None:
+    report, figures = wanted.report, wanted.figures
     if report is None and figures is None:
         return
     from chladni.viewers.figures.gap import gap_album
@@ -416,5 +431,5 @@ def _draw_album(out: Output, evidence: "GapEvidence", *, report: Path | None, fi
     if report is not None:
         from chladni.viewers.report.gap import write_gap_report
 
-        write_gap_report(evidence, report, album=album)
+        write_gap_report(evidence, report, album=album, interactive=wanted.interactive)
         out.line(f"report: {report}")

@@ -27,21 +27,16 @@ def octaves(
         float | None,
         typer.Option(metavar="HZ", help="Begin here; as low as the record allows if not given.", show_default=False),
     ] = None,
-    start: options.Start = None,
-    end: options.End = None,
+    part: options.Part,
     opener: Opener,
-    json: options.Json = None,
-    csv: options.Csv = None,
-    figures: options.Figures = None,
-    report: options.Report = None,
+    targets: options.Targets,
 ) -> None:
     """Levels in octaves, third octaves, or finer bands, after IEC 61260-1."""
     from chladni.apps.findings import reading_sentences
     from chladni.apps.octaves import measure_octaves, octaves_document
-    from chladni.apps.sources import Span
     from chladni.signals.study import Study
 
-    out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures, report=report)
+    out = targets.output([log, opener.setup])
     with opener(log) as opened, out.progress(log.name) as progress:
         found = measure_octaves(
             opened,
@@ -49,7 +44,7 @@ def octaves(
             fraction=fraction,
             weighting=weighting,
             low_hz=low,
-            span=Span(start_s=start, end_s=end),
+            span=part.span(),
             progress=progress,
         )
         told = reading_sentences(opened, everything=channel is None)
@@ -58,7 +53,7 @@ def octaves(
     out.lines((*told, *found.notes))
     study = Study(title=log.name, octaves=found.octaves, findings=(*told, *found.notes))
     out.csv(found.octaves)
-    out.pictures(study, figures=figures, report=report)
+    out.pictures(study, figures=targets.figures, report=targets.report)
     out.json(octaves_document(found))
 
 

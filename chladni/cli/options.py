@@ -2,7 +2,7 @@
 
 import re
 from collections import deque
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
@@ -52,15 +52,18 @@ Csv = Annotated[
         "--csv", metavar="FILE", help="Write the values as a table; - for standard output.", show_default=False
     ),
 ]
-Channels = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--channel",
+
+
+def _only(role: str) -> Any:
+    return typer.Option(
+        f"--{role}",
         metavar="NAME",
-        help="Only this channel, by name, unique ending (ch1) or pattern ('*/accel.x'); may be repeated.",
+        help=f"Only this {role}, by name, unique ending (ch1) or pattern ('*/accel.x'); may be repeated.",
         show_default=False,
-    ),
-]
+    )
+
+
+Channels = Annotated[list[str] | None, _only("channel")]
 References = Annotated[
     list[str] | None,
     typer.Option(
@@ -70,15 +73,7 @@ References = Annotated[
         show_default=False,
     ),
 ]
-Responses = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--response",
-        metavar="NAME",
-        help="Only this response, by name, unique ending (ch1) or pattern ('*/accel.x'); may be repeated.",
-        show_default=False,
-    ),
-]
+Responses = Annotated[list[str] | None, _only("response")]
 Resolution = Annotated[
     float | None,
     typer.Option(metavar="HZ", help="Distance of the frequency lines; chosen by the log's length if not given."),
@@ -105,6 +100,9 @@ Join = Annotated[
 Report = Annotated[
     Path | None,
     typer.Option(metavar="FILE.html", help="Write a self-contained HTML report.", show_default=False),
+]
+Static = Annotated[
+    bool, typer.Option("--static", help="Put pictures in the report, not plots that zoom: a smaller file, no script.")
 ]
 Decibels = Annotated[bool, typer.Option("--db", help="Number levels in decibels, in figures and report.")]
 LogFrequency = Annotated[
@@ -195,15 +193,30 @@ class Targets:
     csv: Csv = None
     figures: Figures = None
     report: Report = None
+    static: Static = False
 
-    def output(self, reads: Sequence[Path | None], looks: Looks | None = None) -> "Output":
+    def output(
+        self,
+        reads: Sequence[Path | None],
+        looks: Looks | None = None,
+        *,
+        others: Mapping[str, Path | None] | None = None,
+    ) -> "Output":
         """Give the output of a command that reads `reads`, once all that it will write is known to have its place."""
         from chladni.cli.output import Output
         from chladni.cli.places import require_drawn
 
         if looks is not None:
             require_drawn({"--db": looks.db, "--log-frequency": looks.log_frequency}, [self.figures, self.report])
-        return Output.of_log(reads, json=self.json, csv=self.csv, figures=self.figures, report=self.report)
+        return Output.of_log(
+            reads,
+            json=self.json,
+            csv=self.csv,
+            figures=self.figures,
+            report=self.report,
+            static=self.static,
+            others=others,
+        )
 
 
 class Command(TyperCommand):

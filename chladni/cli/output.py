@@ -72,9 +72,14 @@ class Output:
     """Tables go to standard output, unless JSON or CSV was asked for there: then to standard error."""
 
     def __init__(
-        self, json_target: str | None = None, csv_target: str | None = None, *, reads: Sequence[Path | None] = ()
+        self,
+        json_target: str | None = None,
+        csv_target: str | None = None,
+        *,
+        reads: Sequence[Path | None] = (),
+        static: bool = False,
     ) -> None:
-        self._reads = reads
+        self._reads, self._static = reads, static
         self.json_target = _told_target(json_target, "the document of --json")
         self.csv_target = _told_target(csv_target, "the table of --csv")
         if self.json_target == self.csv_target == "-":
@@ -93,12 +98,21 @@ class Output:
         csv: str | None = None,
         figures: Path | None,
         report: Path | None = None,
+        static: bool = False,
+        others: Mapping[str, Path | None] | None = None,
     ) -> Self:
-        """Give the output of a command that reads `reads`, once all that it will write is known to have its place."""
+        """Give the output of a command that reads `reads`, once all that it will write is known to have its place.
+
+        `static` puts pictures in its report, not plots; `others` are further files, by the option that asks for each.
+        """
+        if static and report is None:
+            raise SetupError("--static says how a report looks; ask for one (--report FILE.html)")
         require_places(
-            reads=reads, writes={"--json": json, "--csv": csv, "--report": report}, folders={"--figures": figures}
+            reads=reads,
+            writes={"--json": json, "--csv": csv, **(others or {}), "--report": report},
+            folders={"--figures": figures},
         )
-        return cls(json, csv, reads=reads)
+        return cls(json, csv, reads=reads, static=static)
 
     def line(self, text: str = "", *, style: str = "") -> None:
         """Print one line, wrapped at the terminal's width."""
@@ -175,7 +189,7 @@ class Output:
         if report is not None:
             from chladni.viewers.report import write_report
 
-            write_report(study, report, album=album)
+            write_report(study, report, album=album, interactive=False if self._static else None)
             self.line(f"report: {report}")
 
     def figures(self, command: str, drawn: "Mapping[str, Figure]", folder: Path) -> None:
@@ -205,6 +219,11 @@ class Output:
         logs = [{"log": name, **content} for name, content in contents.items()]
         self.json({"format": "chladni.logs/1", "logs": logs})
 
+    @property
+    def csv_streams(self) -> bool:
+        """Whether ``--csv`` named a stream, which takes one table."""
+        return self.csv_target is not None and (self.csv_target == "-" or Place.of(Path(self.csv_target)).is_stream)
+
     def csv(self, values: "Sequence[Value]") -> None:
         """Write `values` where ``--csv`` said, and say so; nothing when it wasn't given.
 
@@ -214,7 +233,7 @@ class Output:
         if self.csv_target is None:
             return
         target = Path(self.csv_target)
-        if len(values) > 1 and (self.csv_target == "-" or Place.of(target).is_stream):
+        if len(values) > 1 and self.csv_streams:
             raise SetupError(
                 f"--csv {target}: a stream takes one table, and there are {len(values)} of different axes; "
                 "name a file, or a single channel (--channel)"

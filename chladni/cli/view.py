@@ -10,7 +10,6 @@ from chladni.cli import options
 from chladni.cli.logs import log_names
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.places import require_places
 
 if TYPE_CHECKING:
     from chladni.signals.study import Study
@@ -35,6 +34,7 @@ def view(
     json: options.Json = None,
     figures: options.Figures = None,
     report: options.Report = None,
+    static: options.Static = False,
 ) -> None:
     """Waveforms, spectra, waterfalls and transfer functions in rerun."""
     from chladni.apps.analyse import analyse
@@ -43,12 +43,9 @@ def view(
 
     if save is not None and web:
         raise SetupError("--save writes a file and --web serves a page; give one of them")
-    require_places(
-        reads=[*logs, opener.setup],
-        writes={"--json": json, "--save": save, "--report": report},
-        folders={"--figures": figures},
+    out = Output.of_log(
+        [*logs, opener.setup], json=json, figures=figures, report=report, static=static, others={"--save": save}
     )
-    out = Output(json)
     opening, studies = opener.among(logs), []
     for title, log in zip(log_names(logs), logs, strict=True):
         with opening(log) as opened, out.progress(title) as progress:

@@ -90,6 +90,19 @@ def test_figures_and_report_are_saved_where_asked(run, arm_log, tmp_path):
     assert TOOL in report.read_text(encoding="utf-8")
 
 
+def test_a_report_has_pictures_where_plots_arent_wanted(run, arm_log, tmp_path):
+    plots, pictures = tmp_path / "plots.html", tmp_path / "pictures.html"
+    for report, more in ((plots, []), (pictures, ["--static"])):
+        outcome = run("psd", arm_log, "--channel", TOOL, "--report", report, *more)
+        assert outcome.code == 0, outcome.err
+    assert "<img" in pictures.read_text(encoding="utf-8")
+    assert "<script" not in pictures.read_text(encoding="utf-8")
+    assert "<script" in plots.read_text(encoding="utf-8")
+    refused = run("psd", arm_log, "--static")
+    assert (refused.code, refused.err.count("\n")) == (2, 1)
+    assert "--static says how a report looks; ask for one (--report FILE.html)" in refused.err
+
+
 def test_a_table_that_is_cut_says_so_and_how_it_is_ordered(run, tmp_path):
     # Twelve tones in noise, in one unit and in two.
     time_s = np.arange(40_000) / 1000

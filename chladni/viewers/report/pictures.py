@@ -4,6 +4,7 @@ import base64
 from collections.abc import Sequence
 from importlib.util import find_spec
 
+from chladni.signals.errors import SetupError
 from chladni.viewers.figures import Album
 from chladni.viewers.figures.sheet import WIDTH_IN
 from chladni.viewers.report.markup import element, escaped
@@ -26,7 +27,10 @@ class Pictures:
 
     def __init__(self, *albums: Album, interactive: bool | None = None) -> None:
         self._items = None
-        if (find_spec("bokeh") is not None) if interactive is None else interactive:
+        installed = find_spec("bokeh") is not None
+        if interactive and not installed:
+            raise SetupError("plots that zoom need Bokeh: pip install 'chladni[bench]', or leave interactive out")
+        if installed if interactive is None else interactive:
             from chladni.viewers.interactive import PlotItems
 
             self._items = PlotItems(*albums)
