@@ -123,8 +123,15 @@ class FileLog(Log):
         missing = [] if paths is None else _without(paths, found)
         if missing or not found:
             told = f"between {start_s or 0.0} s and {'its end' if end_s is None else f'{end_s} s'}"
+            told += self._ends(groups, start_s)
             raise LogError(f"{self._path.name}: {some_of(missing) + ' has ' if missing else ''}no sample {told}")
         return tuple(found)
+
+    def _ends(self, groups: Sequence[TimeSeries], start_s: float | None) -> str:
+        """Say where the samples end, for a window that begins behind them."""
+        last_ns = max((one.start_time_ns + round(one.duration_s * NS_PER_S) for one in groups), default=None)
+        end_s = None if last_ns is None else (last_ns - self.start_time_ns) / NS_PER_S
+        return f" (the file ends at {end_s:.6g} s)" if start_s and end_s is not None and start_s >= end_s else ""
 
     def blocks(
         self,

@@ -6,7 +6,7 @@ from math import floor, isfinite, log2
 from typing import Literal
 
 from chladni.signals.errors import EstimateError, SetupError
-from chladni.signals.wording import rounded_up
+from chladni.signals.wording import counted, rounded_up
 from chladni.spectral.windows import Window
 
 Detrend = Literal["none", "constant", "linear"]
@@ -142,7 +142,8 @@ def _default_samples(samples_available: int | None) -> int:
     if longest < SHORTEST_SEGMENT:
         if samples_available < 2 * SHORTEST_SEGMENT:
             raise EstimateError(
-                f"{samples_available} samples are too few for an averaged spectrum; take a longer record"
+                f"a record of {counted(samples_available, 'sample')} is too short for an averaged spectrum; "
+                "take a longer one"
             )
         return SHORTEST_SEGMENT
     return int(2 ** floor(log2(longest)))

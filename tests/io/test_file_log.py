@@ -226,7 +226,7 @@ def test_seconds_count_from_the_earliest_sample(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("start_s", "end_s", "words"),
     [
-        (3.0, None, r"force, tip has no sample between 3\.0 s and its end"),
+        (3.0, None, r"force, tip has no sample between 3\.0 s and its end \(the file ends at 2 s\)"),
         (None, -1.0, r"no sample between 0\.0 s and -1\.0 s"),
         (1.0, 1.0, "the window from 1.0 s to 1.0 s is empty"),
         (float("nan"), None, "time nan s must be finite"),

@@ -78,7 +78,7 @@ def test_impossible_wishes_say_what_is_possible(options, words):
 
 
 def test_too_few_samples_and_bad_hops_are_refused():
-    with pytest.raises(EstimateError, match="7 samples are too few"):
+    with pytest.raises(EstimateError, match="record of 7 samples is too short"):
         plan_segmentation(100.0, samples_available=7)
     with pytest.raises(SetupError, match="at least 4"):
         Segmentation(samples=3, hop=1)
