@@ -1,7 +1,7 @@
 """``chladni convert``: files of other programs to MCAP and back."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -10,6 +10,9 @@ from chladni.cli.opening import Opener, opens_files, parse_options
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import count, number
+
+if TYPE_CHECKING:
+    from chladni.io.convert import Conversion
 
 
 @opens_files
@@ -71,16 +74,18 @@ def convert(
         f"{number(written.duration_s, digits=6)} s"
     )
     out.lines((*written.notes, *unread_sentences(one for one in written.unread if not one.complete), *written.losses))
-    out.json(
-        {
-            "format": "chladni.convert/1",
-            "source": str(written.source),
-            "target": str(written.target),
-            "channels": list(written.channels),
-            "samples": written.samples,
-            "duration_s": written.duration_s,
-            "notes": list(written.notes),
-            "losses": list(written.losses),
-            "unread": [one.to_json() for one in written.unread],
-        }
-    )
+    out.json(_document(written))
+
+
+def _document(written: "Conversion") -> dict[str, Any]:
+    return {
+        "format": "chladni.convert/1",
+        "source": str(written.source),
+        "target": str(written.target),
+        "channels": list(written.channels),
+        "samples": written.samples,
+        "duration_s": written.duration_s,
+        "notes": list(written.notes),
+        "losses": list(written.losses),
+        "unread": [one.to_json() for one in written.unread],
+    }

@@ -1,5 +1,6 @@
 """``chladni orders``: vibration in multiples of a shaft's speed."""
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -15,33 +16,51 @@ if TYPE_CHECKING:
 RPM = 60.0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shaft:
+    """What tells the shaft's rotation."""
+
+    tacho: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Channel of pulses of the shaft.", show_default=False)
+    ] = None
+    pulses: Annotated[float, typer.Option(metavar="N", help="Pulses a revolution.")] = 1.0
+    threshold: Annotated[
+        float | None,
+        typer.Option(metavar="LEVEL", help="What a pulse passes; midway if not given.", show_default=False),
+    ] = None
+    phase: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Channel of the shaft's angle.", show_default=False)
+    ] = None
+    speed: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Channel of the shaft's speed.", show_default=False)
+    ] = None
+    ridge: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="A vibration that tells it by one of its orders.", show_default=False),
+    ] = None
+    ridge_order: Annotated[float, typer.Option(metavar="ORDER", help="Which order the ridge is.")] = 1.0
+    ridge_band: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="LO-HI", help="Where the ridge runs, in Hz.", show_default=False),
+    ] = None
+
+    def telling(self) -> tuple[str, str]:
+        """Give the channel that tells the shaft, and how."""
+        from chladni.signals.errors import SetupError
+
+        named = {"tacho": self.tacho, "phase": self.phase, "speed": self.speed, "ridge": self.ridge}
+        given = [(path, how) for how, path in named.items() if path is not None]
+        if len(given) != 1:
+            flags = ", ".join(f"--{how}" for how in named)
+            raise SetupError(f"name exactly one channel that tells the shaft's rotation: {flags}")
+        return given[0]
+
+
 @opens_files
 def orders(
     log: options.Log,
     *,
-    tacho: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Channel of pulses of the shaft.", show_default=False)
-    ] = None,
-    pulses: Annotated[float, typer.Option(metavar="N", help="Pulses a revolution.")] = 1.0,
-    threshold: Annotated[
-        float | None,
-        typer.Option(metavar="LEVEL", help="What a pulse passes; midway if not given.", show_default=False),
-    ] = None,
-    phase: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Channel of the shaft's angle.", show_default=False)
-    ] = None,
-    speed: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Channel of the shaft's speed.", show_default=False)
-    ] = None,
-    ridge: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="A vibration that tells it by one of its orders.", show_default=False),
-    ] = None,
-    ridge_order: Annotated[float, typer.Option(metavar="ORDER", help="Which order the ridge is.")] = 1.0,
-    ridge_band: Annotated[
-        tuple[float, float] | None,
-        typer.Option(metavar="LO-HI", help="Where the ridge runs, in Hz.", show_default=False),
-    ] = None,
+    shaft: Shaft,
     order: Annotated[
         list[float] | None,
         typer.Option(
@@ -72,11 +91,11 @@ def orders(
     from chladni.apps.orders import track_orders
 
     out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures)
-    shaft, telling = _telling(tacho=tacho, phase=phase, speed=speed, ridge=ridge)
+    channel_of_shaft, telling = shaft.telling()
     with opener(log) as opened:
         found = track_orders(
             opened,
-            shaft=shaft,
+            shaft=channel_of_shaft,
             channels=channel,
             orders=order,
             method=method,
@@ -84,10 +103,10 @@ def orders(
             highest_order=highest,
             span=part.span(),
             telling=telling,
-            pulses_a_revolution=pulses,
-            threshold=threshold,
-            ridge_order=ridge_order,
-            ridge_hz=ridge_band,
+            pulses_a_revolution=shaft.pulses,
+            threshold=shaft.threshold,
+            ridge_order=shaft.ridge_order,
+            ridge_hz=shaft.ridge_band,
         )
         told = reading_sentences(opened, everything=channel is None)
     for cuts in found.cuts:
@@ -99,17 +118,6 @@ def orders(
 
         out.figures("orders", order_figures(found.maps, found.cuts), figures)
     out.json(orders_document(found))
-
-
-def _telling(**named: str | None) -> tuple[str, str]:
-    """Give the channel that tells the shaft, and how."""
-    from chladni.signals.errors import SetupError
-
-    given = [(path, how) for how, path in named.items() if path is not None]
-    if len(given) != 1:
-        flags = ", ".join(f"--{how}" for how in named)
-        raise SetupError(f"name exactly one channel that tells the shaft's rotation: {flags}")
-    return given[0]
 
 
 def _print_cuts(out: Output, cuts: "OrderCuts") -> None:
