@@ -8,7 +8,7 @@ from chladni.cli import options
 from chladni.cli.logs import told_apart
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.words import angle, number, unit, with_error
+from chladni.cli.words import angle, fixed, number, unit, with_error
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
@@ -133,5 +133,5 @@ def _at_peak(response: "FrequencyResponse", peak: "Peak") -> list[str]:
         with_error(peak.height, peak.height_std),
         unit(peak.unit),
         angle(float(np.angle(response.values[row, column, line], deg=True))),
-        number(float(response.coherence[row, line]), digits=3),
+        fixed(float(response.coherence[row, line]), places=3),
     ]

@@ -7,6 +7,7 @@ from itertools import takewhile
 
 # A topic or a message path as it stands in a sentence: from a slash to what can't be in it.
 _PATH = re.compile(r"(?<![\w/.\]])/[\w\-./\[\]{}]*[\w\]}]")
+_PATHS = re.compile(rf"{_PATH.pattern}(?:, {_PATH.pattern})*(?: and \d+ more)?")
 # Fewer paths have no prefix that is worth a line.
 FEWEST_PATHS = 3
 
@@ -70,5 +71,6 @@ def _shared(paths: Sequence[str]) -> str:
 def _parted(sentence: str) -> tuple[str, str]:
     """Split a sentence that begins with paths at its colon."""
     subject, colon, said = sentence.partition(": ")
-    begins = subject.startswith("/") and _PATH.match(subject) is not None
+    # Paths and how many more there are, no words: those would be told as if they were a name.
+    begins = subject.startswith("/") and _PATHS.fullmatch(subject) is not None
     return (subject, said) if colon and begins else ("", sentence)

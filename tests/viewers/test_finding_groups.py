@@ -37,3 +37,9 @@ def test_units_and_words_with_slashes_stay() -> None:
     sentences = ("Strongest in m/s^2: 3 Hz.", "and/or: both", "1 (m/s^2)/N")
     told = told_findings(sentences, {"/s": "no"})
     assert tuple(one for group in told.groups for one in group.findings) == sentences
+
+
+def test_a_sentence_that_begins_with_a_path_and_words_has_no_subject() -> None:
+    said = "/a/x drifts against /a/y: name one"
+    (group,) = told_findings([said], {}).groups
+    assert (group.subject, group.findings) == ("", (said,))

@@ -113,11 +113,11 @@ def _density_figure(channels: dict[str, list[Curve]], scales: Scales) -> Figure:
     labels = short_names([name for name in channels if name])
     for axes, (name, curves) in zip(stack, channels.items(), strict=True):
         _draw_over(axes, curves, scales, decade_db=10)
-        if name and len(channels) > 1:
+        if name:
             axes.set_title(plain(labels[name]), loc="left", pad=2)
         if axes is not stack[0] and (repeated := axes.get_legend()) is not None:
             repeated.remove()
-    legend(stack[0], above_points=TITLE_POINTS if len(channels) > 1 else 0.0)
+    legend(stack[0], above_points=TITLE_POINTS if labels else 0.0)
     _share_label(figure, stack)
     stack[-1].set_xlabel("Frequency [Hz]")
     return figure

@@ -30,8 +30,8 @@ class UntranslatableError(Exception):
 # Pixels of a line's width or a mark's size for each point on paper.
 PIXELS_A_POINT = 1.5
 MOST_SEGMENTS = 2000
-# Share of the width that a name above the frame takes.
-NAME_SHARE = 0.05
+# Share of the width that a name above the frame takes, beside another plot in a window of 1280 pixels.
+NAME_SHARE = 0.085
 _MARKS = {
     ".": "circle", "o": "circle", "^": "triangle", "v": "inverted_triangle", "s": "square", "x": "x", "+": "cross",
     "d": "diamond", "D": "diamond",
@@ -407,12 +407,16 @@ def _draw_text(axes: Axes, target: Target, text: Text, names: list[float]) -> No
     place_x = x if across else _unshared(axes.get_xlim(), x, log=axes.get_xscale() == "log")
     top = target.plot.y_range.end if target.range_name == "default" else target.plot.extra_y_ranges["right"].end
     inside = not across and x >= 1.0
+    # A name in the middle over a mark at either edge would be cut there.
+    aside = "right" if inside or (upright and not up) else text.get_horizontalalignment()
+    if aside == "center" and not upright:
+        aside = "left" if share < NAME_SHARE / 2 else "right" if share > 1 - NAME_SHARE / 2 else aside
     # Inside the top of the frame, where it stands above it on paper.
     baseline = text.get_verticalalignment() if up else ("middle" if upright else "top")
     look |= {
         "x": place_x,
         "y": float(target.up([y])[0]) if up else top,
-        "text_align": "right" if inside or (upright and not up) else text.get_horizontalalignment(),
+        "text_align": aside,
         "text_baseline": _BASELINES.get(baseline, baseline),
         "y_range_name": target.range_name,
         "y_offset": 0 if up else -3,

@@ -81,7 +81,8 @@ def _findings(study: Study, style: Style) -> str:
     told = told_findings(study.findings, style.labels)
     shown = "".join(_finding(group) for group in told.groups)
     names = f"Paths below begin with {told.prefix}. " if told.prefix else ""
-    note = element("p", escaped(f"{names}Short names are those of the table of channels."), class_="note")
+    listed = "Short names are those of the table of channels." if style.labels else ""
+    note = element("p", escaped(f"{names}{listed}".strip()), class_="note") if names or listed else ""
     return note + element("ul", shown)
 
 
