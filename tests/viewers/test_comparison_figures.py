@@ -120,8 +120,13 @@ def test_a_spectrum_of_nothing_but_gaps_is_drawn() -> None:
     comparison = density_comparison()
     unknown = np.full_like(comparison.change_db, np.nan)
     empty = replace(comparison, change_db=unknown, change_std_db=unknown, significant=np.isfinite(unknown))
-    for figure in comparison_figures([empty]).values():
+    drawn = comparison_figures([empty])
+    assert drawn.keys() == comparison_figures([comparison]).keys()
+    for figure in drawn.values():
         figure.draw(FigureCanvasAgg(figure).get_renderer())
+        for axes in figure.axes:
+            # The frame still holds 0 dB and a width to see it by.
+            assert axes.get_ylim()[0] < 0 < axes.get_ylim()[1]
 
 
 @pytest.mark.parametrize("name", ["change of psd 1 Force", "change of response 1 Acceleration"])

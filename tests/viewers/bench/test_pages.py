@@ -309,6 +309,7 @@ def test_charts_keep_their_axes_when_what_stands_above_them_grows(page: Any) -> 
         strip.evaluate(f"(words) => {{ words.getRootNode().host.style.paddingTop = '{padding}'; }}")
         page.wait_for_function(f"() => ({CHARTS_JS})().{charts}")
         page.wait_for_function(f"() => ({CHARTS_JS})().over < 1")
+    assert abs(page.evaluate(CHARTS_JS)["height"] - before) <= 1
 
 
 @needs_chromium
