@@ -172,7 +172,16 @@ def _severity(found: Severity, row: int) -> Document:
         "high_hz": found.band_hz[1],
         "velocity_mm_s": finite(float(found.velocity_mm_s[row])),
         "velocity_std_mm_s": finite(float(found.velocity_std_mm_s[row])),
+        "displacement_um": finite(float(found.displacement_um[row])),
+        "displacement_std_um": finite(float(found.displacement_std_um[row])),
         "machine": found.machine,
         "boundaries_mm_s": list(found.boundaries_mm_s) or None,
-        "zone": found.zones[row] if found.zones else None,
+        "boundaries_um": list(found.boundaries_um) or None,
+        "velocity_zone": _of_row(found.velocity_zones, row),
+        "displacement_zone": _of_row(found.displacement_zones, row),
+        "zone": _of_row(found.zones, row),
     }
+
+
+def _of_row(zones: tuple[str, ...], row: int) -> str | None:
+    return zones[row] or None if zones else None

@@ -105,20 +105,35 @@ def _print_levels(out: Output, found: "Levels") -> None:
 
 
 def _print_severity(out: Output, found: "Severity") -> None:
-    zoned = ["zone"] if found.zones else []
-    limits = ", ".join(
-        f"{pair} {limit:g}" for pair, limit in zip(("A/B", "B/C", "C/D"), found.boundaries_mm_s, strict=False)
-    )
-    by = f", zones of ISO 20816-3 for {found.machine}: {limits} mm/s" if found.zones else ""
+    zoned = ["zone", "by"] if found.zones else []
+    low_hz, high_hz = map(number, found.band_hz)
+    by = ""
+    if found.zones:
+        by = f", zones of ISO 20816-3 for {found.machine}: {_limits(found.boundaries_mm_s)} mm/s"
+        by += f"; {_limits(found.boundaries_um)} um"
     out.channel_table(
-        f"Vibration severity, velocity RMS from {number(found.band_hz[0])} to {number(found.band_hz[1])} Hz{by}",
-        ["channel", "velocity RMS [mm/s]", *zoned],
+        f"Vibration severity from {low_hz} to {high_hz} Hz{by}",
+        ["channel", "velocity RMS [mm/s]", "displacement RMS [um]", *zoned],
         [
             [
                 channel.name,
                 with_error(float(found.velocity_mm_s[row]), float(found.velocity_std_mm_s[row])),
-                *found.zones[row : row + 1],
+                with_error(float(found.displacement_um[row]), float(found.displacement_std_um[row])),
+                *_judged(found, row),
             ]
             for row, channel in enumerate(found.channels)
         ],
     )
+
+
+def _limits(boundaries: tuple[float, ...]) -> str:
+    return ", ".join(f"{pair} {one:g}" for pair, one in zip(("A/B", "B/C", "C/D"), boundaries, strict=True))
+
+
+def _judged(found: "Severity", row: int) -> list[str]:
+    """Give the zone, and the severer criterion that it's told by."""
+    if not found.zones:
+        return []
+    velocity, displacement = found.velocity_zones[row], found.displacement_zones[row]
+    both = "both" if velocity == displacement else "velocity" if velocity > displacement else "displacement"
+    return [found.zones[row], both]

@@ -152,7 +152,7 @@ class Levels(Value):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Severity(Value):
-    """Vibration severity: RMS of velocity in the band of ISO 20816-3.
+    """Vibration severity: RMS of velocity and of displacement in the band of ISO 20816-3.
 
     Attributes
     ----------
@@ -162,35 +162,55 @@ class Severity(Value):
         Band of the standard, and what of it the sample rate shows.
     velocity_mm_s, velocity_std_mm_s
         ``[channel]``, RMS of velocity in mm/s, and one sigma of it.
+    displacement_um, displacement_std_um
+        ``[channel]``, RMS of displacement in um, and one sigma of it.
     machine
         Class of the machine, such as ``medium-rigid``; None when it wasn't named.
-    boundaries_mm_s
-        Boundaries A/B, B/C and C/D of the class's zones in mm/s; empty without a class.
-    zones
-        ``A`` to ``D`` for each channel; empty without a class.
-    running
-        The same over time: levels of velocity in m/s, of one band.
+    boundaries_mm_s, boundaries_um
+        Boundaries A/B, B/C and C/D of the class's zones, of velocity and of displacement; empty without a class.
+    running, running_displacement
+        The same over time: levels of velocity in m/s and of displacement in m, of one band.
     notes
         What isn't as the standard wants it, in sentences.
     """
 
-    AXES: ClassVar = dict.fromkeys(("velocity_mm_s", "velocity_std_mm_s", "zone"), ("channels",))
+    AXES: ClassVar = dict.fromkeys(
+        ("velocity_mm_s", "velocity_std_mm_s", "displacement_um", "displacement_std_um", "zone"), ("channels",)
+    )
     ROWS: ClassVar = "channels"
 
     channels: tuple[Channel, ...]
     band_hz: tuple[float, float]
     velocity_mm_s: Real
     velocity_std_mm_s: Real
+    displacement_um: Real
+    displacement_std_um: Real
     machine: str | None
     boundaries_mm_s: tuple[float, ...]
-    zones: tuple[str, ...]
+    boundaries_um: tuple[float, ...]
     running: RunningLevels
+    running_displacement: RunningLevels
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("velocity_mm_s", "velocity_std_mm_s"):
+        for name in ("velocity_mm_s", "velocity_std_mm_s", "displacement_um", "displacement_std_um"):
             require_shape(name, getattr(self, name), (len(self.channels),), "one entry a channel")
         self._freeze()
+
+    @property
+    def velocity_zones(self) -> tuple[str, ...]:
+        """Zone of each channel's velocity, ``A`` to ``D``; empty without a class."""
+        return _zones(self.velocity_mm_s, self.boundaries_mm_s)
+
+    @property
+    def displacement_zones(self) -> tuple[str, ...]:
+        """Zone of each channel's displacement; empty without a class."""
+        return _zones(self.displacement_um, self.boundaries_um)
+
+    @property
+    def zones(self) -> tuple[str, ...]:
+        """Zone of each channel, the severer of both; empty without a class."""
+        return tuple(map(max, zip(self.velocity_zones, self.displacement_zones, strict=True)))
 
     @property
     def zone(self) -> NDArray[np.object_]:
@@ -205,9 +225,19 @@ class Severity(Value):
             channels=tuple(self.channels[row] for row in rows),
             velocity_mm_s=self.velocity_mm_s[rows],
             velocity_std_mm_s=self.velocity_std_mm_s[rows],
-            zones=tuple(self.zones[row] for row in rows) if self.zones else (),
+            displacement_um=self.displacement_um[rows],
+            displacement_std_um=self.displacement_std_um[rows],
             running=self.running.rows(rows),
+            running_displacement=self.running_displacement.rows(rows),
         )
+
+
+def _zones(levels: Real, boundaries: tuple[float, ...]) -> tuple[str, ...]:
+    """Give the zone of each level; an empty text where there is none to judge."""
+    if not boundaries:
+        return ()
+    zones = np.searchsorted(boundaries, levels)
+    return tuple("ABCD"[zone] if np.isfinite(level) else "" for zone, level in zip(zones, levels, strict=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,4 +1,4 @@
-"""Vibration severity after ISO 20816-3: RMS of velocity from 10 to 1000 Hz, and its zone."""
+"""Vibration severity after ISO 20816-3: RMS of velocity and displacement from 10 to 1000 Hz, and their zone."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,14 +17,20 @@ from chladni.spectral.levels import LevelsAccumulator
 
 Machine = Literal["large-rigid", "large-flexible", "medium-rigid", "medium-flexible"]
 # ISO 20816-3:2022, tables A.1 (group 1: above 300 kW, or shafts 315 mm high and more) and A.2 (group 2: above 15 kW,
-# or 160 mm), each on rigid and on flexible foundations: boundaries A/B, B/C and C/D in mm/s.
+# or 160 mm), each on rigid and on flexible foundations: boundaries A/B, B/C and C/D in mm/s, and below in um. Each
+# pair is one motion at 12.5 Hz (group 1) or 10 Hz (group 2), rounded: below it displacement is the severer.
 BOUNDARIES_MM_S: Mapping[str, tuple[float, float, float]] = {
     "large-rigid": (2.3, 4.5, 7.1),
     "large-flexible": (3.5, 7.1, 11.0),
     "medium-rigid": (1.4, 2.8, 4.5),
     "medium-flexible": (2.3, 4.5, 7.1),
 }
-ZONES = "ABCD"
+BOUNDARIES_UM: Mapping[str, tuple[float, float, float]] = {
+    "large-rigid": (29.0, 57.0, 90.0),
+    "large-flexible": (45.0, 90.0, 140.0),
+    "medium-rigid": (22.0, 45.0, 71.0),
+    "medium-flexible": (37.0, 71.0, 113.0),
+}
 # ISO 20816-3:2022: 2 Hz instead for machines that turn slower than 600 r/min.
 BAND_HZ, SLOW_BAND_HZ = (10.0, 1000.0), (2.0, 1000.0)
 # A third of an octave: that far outside the band the filter is 3 dB down, so that it's 1 dB down at the band's ends.
@@ -32,7 +38,7 @@ BAND_HZ, SLOW_BAND_HZ = (10.0, 1000.0), (2.0, 1000.0)
 THIRD_OCTAVE = 10**0.1
 # How often each motion is integrated to be a velocity.
 _INTEGRATIONS = {"m/s^2": 1, "m/s": 0}
-MM_PER_M = 1e3
+MM_PER_M, UM_PER_M = 1e3, 1e6
 
 
 def severity(
@@ -45,7 +51,7 @@ def severity(
     machine: Machine | None = None,
     slow: bool = False,
 ) -> Severity:
-    """Measure vibration severity: the RMS of velocity from 10 to 1000 Hz, in mm/s.
+    """Measure vibration severity: the RMS of velocity and of displacement from 10 to 1000 Hz.
 
     Parameters
     ----------
@@ -70,7 +76,8 @@ def severity(
     -------
     Severity
         Zone A: as newly commissioned. B: fit for long-term operation. C: not for long, B was exceeded. D: enough to
-        do damage (ISO 20816-3:2022). The standard judges the largest value of all bearings.
+        do damage (ISO 20816-3:2022). Of velocity and displacement the severer counts. The standard judges the largest
+        value of all bearings.
 
     Raises
     ------
@@ -86,8 +93,8 @@ def severity(
     >>> tone = 9.8 * np.sin(2 * np.pi * 24.9 * t)  # 9.8 / (2 pi 24.9) / sqrt(2) = 44.3 mm/s
     >>> x = TimeSeries.from_arrays(tone, sample_rate_hz=1e4, units="m/s^2")
     >>> found = severity(x, machine="large-rigid")
-    >>> float(found.velocity_mm_s[0].round(1)), found.zones
-    (44.3, ('D',))
+    >>> float(found.velocity_mm_s[0].round(1)), float(found.displacement_um[0].round()), found.zones
+    (44.3, 283.0, ('D',))
     """
     source = blocks_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     lead, blocks = leading_part(source, 1)
@@ -120,12 +127,13 @@ class SeverityAccumulator:
                 f"{self._nyquist_hz:g} Hz; measure at {2 * THIRD_OCTAVE * high_hz:.0f} Hz or more"
             )
         passed_hz = (low_hz / THIRD_OCTAVE, min(high_hz * THIRD_OCTAVE, self._nyquist_hz))
-        self._measured: dict[tuple[str, ...], LevelsAccumulator] = {}
+        # By the channels of one unit: velocity, displacement.
+        self._measured: dict[tuple[str, ...], tuple[LevelsAccumulator, LevelsAccumulator]] = {}
         for unit, integrations in _INTEGRATIONS.items():
-            motions = [channel for channel in channels if channel.unit == unit]
-            if motions:
-                self._measured[tuple(channel.name for channel in motions)] = LevelsAccumulator(
-                    motions, sample_rate_hz, bands_hz=[passed_hz], integrations=integrations
+            if motions := [channel for channel in channels if channel.unit == unit]:
+                self._measured[tuple(channel.name for channel in motions)] = (
+                    LevelsAccumulator(motions, sample_rate_hz, bands_hz=[passed_hz], integrations=integrations),
+                    LevelsAccumulator(motions, sample_rate_hz, bands_hz=[passed_hz], integrations=integrations + 1),
                 )
         if not self._measured:
             raise EstimateError(
@@ -135,23 +143,27 @@ class SeverityAccumulator:
 
     def update(self, block: TimeSeries) -> None:
         """Take in the next block."""
-        for names, accumulator in self._measured.items():
-            accumulator.update(block.select(names))
+        for names, accumulators in self._measured.items():
+            motions = block.select(names)
+            for accumulator in accumulators:
+                accumulator.update(motions)
 
     def result(self) -> Severity:
         """Give the severity; no more blocks may follow."""
-        found = [accumulator.result() for accumulator in self._measured.values()]
-        velocity_mm_s = np.concatenate([one.rms[:, 0] for one in found]) * MM_PER_M
-        boundaries = () if self.machine is None else BOUNDARIES_MM_S[self.machine]
+        velocity, displacement = ([pair[order].result() for pair in self._measured.values()] for order in range(2))
+        machine = self.machine
         return Severity(
-            channels=tuple(channel for one in found for channel in one.channels),
+            channels=tuple(channel for one in velocity for channel in one.channels),
             band_hz=(self.band_hz[0], min(self.band_hz[1], self._nyquist_hz)),
-            velocity_mm_s=velocity_mm_s,
-            velocity_std_mm_s=np.concatenate([one.rms_std[:, 0] for one in found]) * MM_PER_M,
-            machine=self.machine,
-            boundaries_mm_s=boundaries,
-            zones=tuple(ZONES[place] for place in np.searchsorted(boundaries, velocity_mm_s)) if boundaries else (),
-            running=_joined(found),
+            velocity_mm_s=np.concatenate([one.rms[:, 0] for one in velocity]) * MM_PER_M,
+            velocity_std_mm_s=np.concatenate([one.rms_std[:, 0] for one in velocity]) * MM_PER_M,
+            displacement_um=np.concatenate([one.rms[:, 0] for one in displacement]) * UM_PER_M,
+            displacement_std_um=np.concatenate([one.rms_std[:, 0] for one in displacement]) * UM_PER_M,
+            machine=machine,
+            boundaries_mm_s=() if machine is None else BOUNDARIES_MM_S[machine],
+            boundaries_um=() if machine is None else BOUNDARIES_UM[machine],
+            running=_joined(velocity),
+            running_displacement=_joined(displacement),
             notes=self._notes(),
         )
 

@@ -50,6 +50,7 @@ def test_programs_get_levels_severity_and_running_levels(run, log):
     severity = bearing["severity"]
     assert round(severity["velocity_mm_s"], 1) == 44.3
     assert (severity["zone"], severity["boundaries_mm_s"]) == ("D", [2.3, 4.5, 7.1])
+    assert (round(severity["displacement_um"]), severity["boundaries_um"]) == (283, [29.0, 57.0, 90.0])
     assert [note.partition(":")[0] for note in document["notes"]] == ["channels that never change are left out"]
 
 
@@ -66,7 +67,10 @@ def test_people_get_tables_and_a_table_for_spreadsheets(run, log, tmp_path):
     outcome = run("levels", log, "--machine", "large-rigid", "--csv", tmp_path / "levels.csv")
     assert outcome.code == 0, outcome.err
     assert "Levels about the mean, 0 to 2500 Hz" in outcome.out
-    assert "zones of ISO 20816-3 for large-rigid: A/B 2.3, B/C 4.5, C/D 7.1 mm/s" in outcome.out
+    assert (
+        "zones of ISO 20816-3 for large-rigid: A/B 2.3, B/C 4.5, C/D 7.1 mm/s; A/B 29, B/C 57, C/D 90 um"
+        in outcome.out
+    )
     with (tmp_path / "levels.csv").open(encoding="utf-8", newline="") as file:
         _, second = csv.DictReader(file)
     with (tmp_path / "levels_2.csv").open(encoding="utf-8", newline="") as file:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chladni.signals.errors import EstimateError, SetupError
-from chladni.spectral.severity import BOUNDARIES_MM_S, severity
+from chladni.spectral.severity import BOUNDARIES_MM_S, BOUNDARIES_UM, severity
 from tests.spectral.made_signals import blocks, series
 
 RATE_HZ = 5000.0
@@ -24,6 +24,8 @@ def test_an_acceleration_and_its_velocity_have_the_severity_of_the_closed_form()
     assert found.velocity_mm_s.round(1).tolist() == [44.3, 44.3]
     np.testing.assert_allclose(found.velocity_mm_s, 1e3 * 9.8 / omega / np.sqrt(2), rtol=1e-3)
     assert (found.zones, found.boundaries_mm_s, found.notes) == ((), (), ())
+    np.testing.assert_allclose(found.displacement_um, 1e6 * 9.8 / omega**2 / np.sqrt(2), rtol=1e-3)
+    np.testing.assert_allclose(found.running_displacement.rms[:, 0].mean(axis=-1), 283.1e-6, rtol=1e-2)
     np.testing.assert_allclose(found.running.rms[:, 0].mean(axis=-1), 0.0443, rtol=1e-2)
 
 
@@ -64,10 +66,26 @@ def test_zones_are_those_of_the_class(machine, zones):
     assert found.boundaries_mm_s == BOUNDARIES_MM_S[machine]
 
 
+@pytest.mark.parametrize("machine", BOUNDARIES_UM)
+def test_slow_motion_is_judged_by_its_displacement(machine):
+    # 8 Hz: velocity is 2 pi 8 times displacement. A little inside each zone of displacement.
+    low, middle, high = BOUNDARIES_UM[machine]
+    wanted_um = np.array([0.9 * low, 1.1 * low, 1.1 * middle, 1.1 * high])
+    omega = 2 * np.pi * 8
+    values = np.stack([tone(8.0, 1e-6 * one * np.sqrt(2) * omega**2, seconds=16.0) for one in wanted_um])
+    found = severity(series(values, rate_hz=RATE_HZ), machine=machine, slow=True)
+    np.testing.assert_allclose(found.displacement_um, wanted_um, rtol=2e-3)
+    np.testing.assert_allclose(found.velocity_mm_s, 1e-3 * wanted_um * omega, rtol=2e-3)
+    assert found.boundaries_um == BOUNDARIES_UM[machine]
+    assert ("".join(found.velocity_zones), "".join(found.displacement_zones)) == ("AABC", "ABCD")
+    assert "".join(found.zones) == "ABCD"
+
+
 def test_blocks_give_what_the_whole_gives():
     whole = series(np.random.default_rng(1).standard_normal((2, 30_000)), rate_hz=RATE_HZ)
     found, expected = severity(blocks(whole, [1000, 77, 12_000])), severity(whole)
     np.testing.assert_allclose(found.velocity_mm_s, expected.velocity_mm_s, rtol=1e-9)
+    np.testing.assert_allclose(found.displacement_um, expected.displacement_um, rtol=1e-9)
 
 
 def test_a_rate_that_shows_part_of_the_band_is_told_and_one_that_shows_nothing_refused():

@@ -104,32 +104,47 @@ def severity_label(severity: Severity) -> str:
 
 
 def draw_severity(axes: Axes, severity: Severity, group: Group, style: Style) -> None:
-    """Draw the RMS of velocity over time, on the zones of the machine's class."""
-    time_s = _time_s(severity.running, style)
+    """Draw the RMS of velocity over time on the zones of the machine's class; of displacement where that decides."""
+    running, boundaries, per_si, label = (
+        (severity.running_displacement, severity.boundaries_um, 1e6, "Displacement RMS [µm]")
+        if _displaced(severity, group)
+        # Levels are in SI; the standard and its readers count in mm/s.
+        else (severity.running, severity.boundaries_mm_s, 1e3, "Velocity RMS [mm/s]")
+    )
+    time_s = _time_s(running, style)
     top = 0.0
     for row in group.rows:
         channel = severity.channels[row]
-        # Levels are in SI; the standard and its readers count in mm/s.
-        rms_mm_s = 1e3 * severity.running.rms[row, 0]
-        top = max(top, float(np.nanmax(rms_mm_s, initial=0.0)))
-        _line(axes, time_s, rms_mm_s, color=paint(style.on_light(channel)), label=plain(style.labels[channel.name]))
-    _zones(axes, severity.boundaries_mm_s, top)
-    axes.set_ylabel("Velocity RMS [mm/s]")
-    _span(axes, severity.running, style)
+        rms = per_si * running.rms[row, 0]
+        top = max(top, float(np.nanmax(rms, initial=0.0)))
+        _line(axes, time_s, rms, color=paint(style.on_light(channel)), label=plain(style.labels[channel.name]))
+    _zones(axes, boundaries, top)
+    axes.set_ylabel(label)
+    _span(axes, running, style)
     legend(axes)
+
+
+def _displaced(severity: Severity, group: Group) -> bool:
+    """Whether the worst zone of these channels is that of a displacement alone."""
+    worst = [
+        max((zones[row] for row in group.rows), default="")
+        for zones in (severity.velocity_zones, severity.displacement_zones)
+        if zones
+    ]
+    return bool(worst) and worst[1] > worst[0]
 
 
 def _zones(axes: Axes, boundaries: tuple[float, ...], top: float) -> None:
     """Colour the zones up to the next boundary above what is shown, and name them."""
-    above = [limit for limit in boundaries if limit > top]
-    limit_mm_s = HEADROOM * (above[0] if above else top or 1.0)
-    axes.set_ylim(0.0, limit_mm_s)
+    above = [one for one in boundaries if one > top]
+    limit = HEADROOM * (above[0] if above else top or 1.0)
+    axes.set_ylim(0.0, limit)
     if not boundaries:
         return
     edges = [0.0, *boundaries, np.inf]
     for zone, colour, low, high in zip("ABCD", ZONE_COLOURS, edges[:-1], edges[1:], strict=True):
-        if low < limit_mm_s:
-            shown = min(high, limit_mm_s)
+        if low < limit:
+            shown = min(high, limit)
             axes.axhspan(low, shown, color=colour, linewidth=0, zorder=0)
             axes.text(1.01, (low + shown) / 2, zone, transform=axes.get_yaxis_transform(), va="center")
 
