@@ -89,22 +89,32 @@ class Catalog:
         LogError
             When a word names none, or an ending several.
         """
-        listed = [source.channel.name for source in self.channels]
+        listed = {source.channel.name: source for source in self.channels}
         found = [source for word in dict.fromkeys(words) for source in self._named(word, listed)]
         return tuple({source.channel.name: source for source in found}.values())
 
-    def _named(self, word: str, listed: Sequence[str]) -> tuple[ChannelSource, ...]:
+    def _named(self, word: str, listed: Mapping[str, ChannelSource]) -> tuple[ChannelSource, ...]:
+        known = listed.get(word)
+        # Several publishers of a topic are told apart first.
+        if known is not None and known.topic not in self.publishers:
+            return (known,)
         if not is_pattern(word) and starts_with_topic(word, [*self.topics, *self.refused]):
             # Said in full: nothing else is meant by it, also where it can't be read.
-            return (self.resolve(word),)
+            return (self._listed(self.resolve(word)),)
         try:
-            places = places_of(word, listed)
+            places = places_of(word, list(listed))
         except EstimateError as error:
             raise LogError(f"{self.file}: {error}") from None
         if not places and listed and "/" not in word:
             # No path that is written wrongly.
-            raise LogError(f"{self.file}: {unknown(word, listed)}")
+            raise LogError(f"{self.file}: {unknown(word, list(listed))}")
         return tuple(self.channels[place] for place in places) or (self.resolve(word),)
+
+    def _listed(self, source: ChannelSource) -> ChannelSource:
+        """Give a channel as lists have it, however its path was written; one that no list has stays as it is."""
+        place = (source.topic, source.field, source.selector, source.column)
+        same = (one for one in self.channels if (one.topic, one.field, one.selector, one.column) == place)
+        return next(same, source)
 
     def resolve(self, path: str) -> ChannelSource:
         """Find the channel that a path names.

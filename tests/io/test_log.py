@@ -671,6 +671,8 @@ def test_blocks_of_samples(tmp_path: Path) -> None:
         np.testing.assert_array_equal(log.read(["/daq[1]"]).values, samples[1:])
         np.testing.assert_array_equal(log.read(["/daq.b"], start_s=0.6, end_s=1.3).values, samples[1:, 600:1300])
         assert_close(together(list(log.blocks(seconds=0.3))), series, rtol=0, atol=0)
+        # However it's written, it's the channel that lists have.
+        assert log.name("/daq[0]") == log.read(["/daq[0]"]).channels[0].name == '/daq."top floor"'
         with pytest.raises(LogError, match="holds blocks of samples; no column 'c'"):
             log.read(["/daq.c"])
 
