@@ -1,31 +1,35 @@
 """Shock response spectra of a log's accelerations."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
-from chladni.apps.sources import Span, moving_channels, still_note
+from chladni.apps.sources import Progress, Span, Watched, no_progress, still_note, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import EstimateError
 from chladni.signals.shock_response import ShockResponse
 from chladni.signals.time_series import TimeSeries
-from chladni.spectral.shock import ACCELERATIONS, srs
+from chladni.spectral.blocks import leading_part
+from chladni.spectral.shock import ACCELERATIONS, RATE_OVER_HIGHEST, srs
 
 
 def shock_responses(
-    log: Log, *, channels: Sequence[str] | None, span: Span, **options: Any
+    log: Log, *, channels: Sequence[str] | None, span: Span, progress: Progress = no_progress, **options: Any
 ) -> tuple[ShockResponse, ...]:
     """Compute the spectra of named channels, or of all accelerations, one value for each sampling grid.
 
     Parameters
     ----------
     log
-        Read into memory.
+        Read block by block when it's large.
     channels
         Message paths; None for every channel in m/s^2 or rad/s^2 that changes.
     span
         Which part of the log.
+    progress
+        Called with the share done, 0 to 1.
     options
         As for `srs`.
 
@@ -36,29 +40,53 @@ def shock_responses(
     EstimateError
         When there is no acceleration, or an option of `srs` is out of its range.
     """
-    series = log.read_groups(channels, start_s=span.start_s, end_s=span.end_s)
-    if channels is None:
-        chosen = [[c.name for c in one.channels if c.unit in ACCELERATIONS] for one in series]
-        if not any(chosen):
-            units = sorted({channel.unit for one in series for channel in one.channels})
-            raise EstimateError(
-                f"{log.path.name}: no channel is an acceleration; units are {some_of(units)}: name a channel "
-                "(--channel), or give its unit in a setup file (--setup)"
-            )
-        moving = [
-            [name for name in moving_channels(one) if name in names]
-            for one, names in zip(series, chosen, strict=True)
-        ]
-        # Of channels that never change each oscillator stays at rest.
-        kept = moving if any(moving) else chosen
-        series = tuple(one.select(names) for one, names in zip(series, kept, strict=True) if names)
-    try:
-        return tuple(_told_still(srs(one, **options), one) for one in series)
-    except EstimateError as error:
-        raise EstimateError(f"{log.path.name}: {error}") from error
+    found: list[tuple[ShockResponse, Watched]] = []
+    units: set[str] = set()
+    for grid in watched_grids(log, channels, span, progress=progress):
+        lead, blocks = leading_part(grid, 1)
+        units |= {channel.unit for channel in lead[0].channels}
+        names = [c.name for c in lead[0].channels if channels is not None or c.unit in ACCELERATIONS]
+        if names:
+            try:
+                found.append((_of_grid((one.select(names) for one in blocks), grid.duration_s, options), grid))
+            except EstimateError as error:
+                raise EstimateError(f"{log.path.name}: {error}") from error
+    if not found:
+        raise EstimateError(
+            f"{log.path.name}: no channel is an acceleration; units are {some_of(sorted(units))}: name a channel "
+            "(--channel), or give its unit in a setup file (--setup)"
+        )
+    if channels is not None:
+        return tuple(_told_still(one, grid) for one, grid in found)
+    # Of channels that never change each oscillator stays at rest.
+    moving = tuple(part for one, grid in found if (part := _moving(one, grid)) is not None)
+    return moving or tuple(_told_still(one, grid) for one, grid in found)
 
 
-def _told_still(found: ShockResponse, series: TimeSeries) -> ShockResponse:
-    moving = moving_channels(series)
-    still = [channel.name for channel in series.channels if channel.name not in moving]
-    return replace(found, notes=(*found.notes, *still_note(still)))
+def _of_grid(blocks: Iterator[TimeSeries], duration_s: float, options: dict[str, Any]) -> ShockResponse:
+    """Compute the spectra of one sampling grid, which is a single block where it fits in memory."""
+    first, second = next(blocks), next(blocks, None)
+    if second is None:
+        return srs(first, **options)
+    if options.get("band_hz") is None:
+        options = options | {"band_hz": (1 / duration_s, first.sample_rate_hz / RATE_OVER_HIGHEST)}
+    return srs(chain((first, second), blocks), **options)
+
+
+def _moving(found: ShockResponse, grid: Watched) -> ShockResponse | None:
+    still = set(grid.constant())
+    rows = [row for row, channel in enumerate(found.channels) if channel.name not in still]
+    if not rows:
+        return None
+    return replace(
+        found,
+        positive=found.positive[rows],
+        negative=found.negative[rows],
+        offset=found.offset[rows],
+        channels=tuple(found.channels[row] for row in rows),
+    )
+
+
+def _told_still(found: ShockResponse, grid: Watched) -> ShockResponse:
+    still = set(grid.constant())
+    return replace(found, notes=(*found.notes, *still_note([c.name for c in found.channels if c.name in still])))

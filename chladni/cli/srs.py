@@ -52,7 +52,7 @@ def srs(
     from chladni.apps.sources import Span
 
     out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures)
-    with opener(log) as opened:
+    with opener(log) as opened, out.progress(log.name) as progress:
         found = shock_responses(
             opened,
             channels=channel,
@@ -62,6 +62,7 @@ def srs(
             band_hz=band,
             lines_an_octave=lines,
             offset=offset,
+            progress=progress,
         )
         told = reading_sentences(opened, everything=channel is None)
     for one in found:

@@ -172,7 +172,7 @@ def blocks_of(
 
     Consecutive blocks stay what they are. Arguments and errors are as for `series_of`.
     """
-    if _is_blocks(source):
+    if is_blocks(source):
         if not all(option is None for option in (channels, sample_rate_hz, start_s, end_s)):
             raise SetupError("blocks are averaged as they come; choose channels and times where they are made")
         return source
@@ -253,7 +253,7 @@ def _over_frequency(source: object, frequency_hz: ArrayLike | None) -> tuple[Arr
     return frequency_hz, np.asarray(source)
 
 
-def _is_blocks(source: object) -> TypeGuard[Blocks]:
+def is_blocks(source: object) -> TypeGuard[Blocks]:
     """Whether something is blocks of a series, and no array."""
     if isinstance(source, list | tuple):
         return all(isinstance(one, TimeSeries) for one in source)

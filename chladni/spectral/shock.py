@@ -1,20 +1,23 @@
 """Shock response spectra by ramp-invariant filters."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from math import ceil, floor, log2
-from typing import Literal
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 
-from chladni.io.source import SeriesLike, series_of
-from chladni.signals.arrays import Mask, Real
-from chladni.signals.channel import Names
+from chladni.io.source import Blocks, SeriesLike, blocks_of, extent_of, is_blocks, log_or_series
+from chladni.signals.arrays import Index, Mask, Real
+from chladni.signals.channel import Channel, Names
 from chladni.signals.errors import EstimateError
+from chladni.signals.number_range import require_in_range
 from chladni.signals.shock_response import ShockQuantity, ShockResponse
-from chladni.signals.time_series import TimeSeries
+from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.units import integrated
-from chladni.spectral.filters import channel_runs, require_measured
+from chladni.spectral.blocks import leading_part
+from chladni.spectral.filters import channel_runs, measured_samples, require_measured
 
 Offset = Literal["first", "median", "keep"]
 
@@ -27,10 +30,14 @@ RATE_OVER_HIGHEST = 10
 # The octaves' own middle (IEC 61260-1), so that spectra of all records have the same lines.
 MIDDLE_HZ = 1000.0
 MOST_LINES = 10_000
+# `scipy.signal.resample_poly` looks so many samples ahead and back.
+RESAMPLING_REACH = 10
+# What oscillators are fed at once: the samples between those are many times as many.
+SAMPLES_AT_ONCE, VALUES_AT_ONCE = 1 << 16, 1 << 18
 
 
 def srs(
-    source: SeriesLike,
+    source: SeriesLike | Blocks,
     *,
     q: float = 10.0,
     quantity: ShockQuantity = "absolute-acceleration",
@@ -48,8 +55,8 @@ def srs(
     Parameters
     ----------
     source
-        A log, the path to one, a series, or an array ``[channel, sample]``:
-        accelerations, of all channels.
+        A log (read block by block when it's large), the path to one, a series, an array ``[channel, sample]``, or
+        consecutive blocks of a series, which need `band_hz` or `frequencies_hz`: accelerations, of all channels.
     q
         Amplification of the oscillators at resonance, above 0.5; 10 is a damping ratio of 5 %.
     quantity
@@ -97,99 +104,262 @@ def srs(
     >>> float((spectrum.maximax[0, 0] / 500).round(2))  # nearly undamped: 1.77 times as much, at most
     1.77
     """
-    series = series_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
-    _require_accelerations(series, quantity)
+    _require_options(q, offset)
+    blocks, longest = _opened(
+        source, quantity, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s
+    )
+    lead, parts = leading_part(blocks, 1)
+    first = lead[0]
+    lines_hz = _lines(first.sample_rate_hz, longest, band_hz, lines_an_octave, frequencies_hz)
+    offsets = _medians(blocks) if offset == "median" else np.zeros(len(first.channels)) if offset == "keep" else None
+    accumulator = ShockAccumulator(
+        first.channels, first.sample_rate_hz, lines_hz=lines_hz, q=q, quantity=quantity, offsets=offsets
+    )
+    for one in parts:
+        accumulator.update(one)
+    return accumulator.result()
+
+
+class ShockAccumulator:
+    """Running shock response spectra, see `srs`; mutable, the result is a frozen value.
+
+    Parameters
+    ----------
+    channels, sample_rate_hz
+        Of all blocks.
+    lines_hz
+        Natural frequencies, rising.
+    q, quantity
+        As for `srs`.
+    offsets
+        ``[channel]``, taken off first; None for the first sample of each.
+    """
+
+    def __init__(
+        self,
+        channels: Sequence[Channel],
+        sample_rate_hz: float,
+        *,
+        lines_hz: Real,
+        q: float,
+        quantity: ShockQuantity,
+        offsets: Real | None = None,
+    ) -> None:
+        _require_accelerations(channels, quantity)
+        self.channels, self.sample_rate_hz = tuple(channels), sample_rate_hz
+        self._lines_hz, self._q, self._quantity = lines_hz, q, quantity
+        count = len(self.channels)
+        self._offsets = np.full(count, np.nan) if offsets is None else offsets.copy()
+        self._largest = np.zeros(count)
+        self._known, self._runs, self._running = (np.zeros(count, dtype=kind) for kind in (bool, np.intp, bool))
+        self._end_ns: int | None = None
+        factors = np.exp2(np.ceil(np.log2(np.maximum(POINTS_A_CYCLE * lines_hz / sample_rate_hz, 1)))).astype(int)
+        self._banks = [
+            (np.flatnonzero(factors == one), _Bank(count, lines_hz[factors == one], sample_rate_hz, one, q, quantity))
+            for one in np.unique(factors).tolist()
+        ]
+
+    def update(self, block: TimeSeries) -> None:
+        """Take in the next block; `EstimateError` when it has other channels or another rate."""
+        if block.channels != self.channels or block.sample_rate_hz != self.sample_rate_hz:
+            raise EstimateError("blocks of a shock response need the same channels and rate; resample them first")
+        if self._end_ns is not None and abs(block.start_time_ns - self._end_ns) > NS_PER_S / self.sample_rate_hz / 2:
+            self._end(self._running.copy())
+        self._end_ns = block.start_time_ns + round(block.duration_s * NS_PER_S)
+        measured = measured_samples(block)
+        largest = np.max(np.abs(block.values), axis=1, initial=0.0, where=measured)
+        self._largest = np.maximum(self._largest, largest)
+        for first, last in _steady_parts(measured):
+            present = measured[:, first]
+            self._end(self._running & ~present)
+            self._begin(present & ~self._running, block.values[:, first].astype(np.float64))
+            rows = np.flatnonzero(present)
+            for some in np.array_split(rows, max(1, rows.size * (last - first) // VALUES_AT_ONCE)):
+                if some.size:
+                    values = block.values[some, first:last].astype(np.float64) - self._offsets[some, None]
+                    for _, bank in self._banks:
+                        bank.feed(some, values)
+
+    def result(self) -> ShockResponse:
+        """Give the spectra; no more blocks may follow."""
+        self._end(self._running.copy())
+        if not self._known.all():
+            empty = [c.name for c, known in zip(self.channels, self._known, strict=True) if not known]
+            raise EstimateError(f"{', '.join(empty)}: nothing was measured; leave it out")
+        require_in_range(self.channels, self._largest)
+        positive, negative = (np.zeros((len(self.channels), self._lines_hz.size)) for _ in range(2))
+        for lines, bank in self._banks:
+            positive[:, lines], negative[:, lines] = bank.highest, -bank.lowest
+        units = [_unit(channel.unit, self._quantity) for channel in self.channels]
+        return ShockResponse(
+            frequency_hz=self._lines_hz,
+            positive=positive,
+            negative=negative,
+            quantity=self._quantity,
+            q=self._q,
+            channels=tuple(
+                replace(c, unit=unit, overload=None) for c, unit in zip(self.channels, units, strict=True)
+            ),
+            offset=self._offsets,
+            notes=self._notes(),
+        )
+
+    def _begin(self, rows: Mask, values: Real) -> None:
+        fresh = rows & ~self._known & np.isnan(self._offsets)
+        self._offsets[fresh] = values[fresh]
+        self._known |= rows
+        self._running |= rows
+        self._runs[rows] += 1
+
+    def _end(self, rows: Mask) -> None:
+        if rows.any():
+            for _, bank in self._banks:
+                bank.end(np.flatnonzero(rows))
+            self._running &= ~rows
+
+    def _notes(self) -> tuple[str, ...]:
+        notes = []
+        broken = [c.name for c, runs in zip(self.channels, self._runs, strict=True) if runs > 1]
+        if broken:
+            notes.append(
+                f"{', '.join(broken)}: samples are missing; oscillators begin anew after each gap, so that a shock "
+                "that spans one is read too low"
+            )
+        if self._lines_hz[-1] > self.sample_rate_hz / RATE_OVER_HIGHEST * (1 + 1e-9):
+            tenth_hz = self.sample_rate_hz / RATE_OVER_HIGHEST
+            notes.append(
+                f"above {tenth_hz:g} Hz, a tenth of the sample rate, what the sampling has cut off may be missing"
+            )
+        return tuple(notes)
+
+
+class _Bank:
+    """Oscillators whose periods need so many times the samples, of all channels, with what they remember."""
+
+    def __init__(
+        self, channels: int, lines_hz: Real, sample_rate_hz: float, factor: int, q: float, quantity: ShockQuantity
+    ) -> None:
+        rate_hz = factor * sample_rate_hz
+        self._factor = factor
+        self._reach = 0 if factor == 1 else RESAMPLING_REACH
+        self._filters = [_coefficients(one, rate_hz, q, quantity) for one in lines_hz.tolist()]
+        # What is left of the motion after the record has its peaks within a period.
+        self._periods = [ceil(rate_hz / one) for one in lines_hz.tolist()]
+        self._state = np.zeros((lines_hz.size, channels, 2))
+        self._past = np.zeros((channels, 2 * self._reach))
+        self._age = np.zeros(channels, dtype=np.intp)
+        self.highest, self.lowest = np.zeros((channels, lines_hz.size)), np.zeros((channels, lines_hz.size))
+
+    def feed(self, rows: Index, values: Real) -> None:
+        """Take in the next samples of some channels."""
+        for age in np.unique(self._age[rows]).tolist():
+            same = self._age[rows] == age
+            self._respond(rows[same], self._finer(rows[same], values[same], age))
+
+    def end(self, rows: Index) -> None:
+        """Let the oscillators of some channels ring out, and be at rest again."""
+        if self._reach:
+            self.feed(rows, np.zeros((rows.size, self._reach)))
+        for line, period in enumerate(self._periods):
+            self._respond(rows, np.zeros((rows.size, period)), (line,))
+        self._state[:, rows], self._past[rows], self._age[rows] = 0.0, 0.0, 0
+
+    def _finer(self, rows: Index, values: Real, age: int) -> Real:
+        """Give the samples with those between them, band-limited, as late as the filter looks ahead."""
+        from scipy.signal import resample_poly
+
+        if not self._reach:
+            return values
+        known = np.concatenate([self._past[rows], values], axis=1)
+        self._past[rows] = known[:, -2 * self._reach :]
+        self._age[rows] = min(age + values.shape[1], self._reach)
+        # Nothing comes out for times before the first sample.
+        first = self._reach + max(0, self._reach - age)
+        fine = resample_poly(known, self._factor, 1, axis=1)
+        return np.asarray(fine[:, first * self._factor : (known.shape[1] - self._reach) * self._factor])
+
+    def _respond(self, rows: Index, samples: Real, lines: Sequence[int] | None = None) -> None:
+        from scipy.signal import lfilter
+
+        if not samples.shape[1]:
+            return
+        for line in range(len(self._filters)) if lines is None else lines:
+            b, a = self._filters[line]
+            response, self._state[line, rows] = lfilter(b, a, samples, axis=1, zi=self._state[line, rows])
+            self.highest[rows, line] = np.maximum(self.highest[rows, line], response.max(axis=1))
+            self.lowest[rows, line] = np.minimum(self.lowest[rows, line], response.min(axis=1))
+
+
+def _coefficients(natural_hz: float, rate_hz: float, q: float, quantity: ShockQuantity) -> tuple[Real, Real]:
+    from scipy.signal import cont2discrete
+
+    omega, damping = 2 * np.pi * natural_hz, 1 / (2 * q)
+    numerator, scale = {
+        "absolute-acceleration": (np.array([2 * damping, 1.0]), 1.0),
+        "relative-displacement": (np.array([-1.0]), omega**-2),
+        "pseudo-velocity": (np.array([-1.0]), 1 / omega),
+    }[quantity]
+    # In units of the natural frequency, so that coefficients are of one size at every frequency.
+    b, a, _ = cont2discrete((numerator, np.array([1.0, 2 * damping, 1.0])), omega / rate_hz, method="foh")
+    return scale * np.ravel(b), np.asarray(a, dtype=np.float64)
+
+
+def _steady_parts(measured: Mask) -> Iterator[tuple[int, int]]:
+    """Give first and last + 1 of the stretches in which no channel begins or ends to be measured, none too long."""
+    changes = np.flatnonzero((measured[:, 1:] != measured[:, :-1]).any(axis=0)) + 1
+    edges = [0, *changes.tolist(), measured.shape[1]]
+    for first, last in pairwise(edges):
+        for begin in range(first, last, SAMPLES_AT_ONCE):
+            yield begin, min(begin + SAMPLES_AT_ONCE, last)
+
+
+def _require_options(q: float, offset: str) -> None:
     if not 0.5 < q < np.inf:
         raise EstimateError(f"q is {q:g}; it must be finite and above 0.5, such as 10 for 5 % damping")
+    if offset not in get_args(Offset):
+        raise EstimateError(f"offset {offset!r} is none of {', '.join(get_args(Offset))}")
+
+
+def _opened(
+    source: SeriesLike | Blocks, quantity: ShockQuantity, *, sample_rate_hz: float | None, **part: Any
+) -> tuple[TimeSeries | Blocks, int | None]:
+    """Give the samples, and the length of the longest run; None of a stream, which doesn't say it before its end."""
+    if is_blocks(source):
+        return blocks_of(source, sample_rate_hz=sample_rate_hz, **part), None
+    opened = log_or_series(cast("SeriesLike", source), sample_rate_hz=sample_rate_hz)
+    blocks = blocks_of(opened, **part)
+    if isinstance(blocks, TimeSeries):
+        return blocks, _longest_run(blocks, quantity)
+    rate_hz, duration_s = extent_of(opened, **part)
+    return blocks, round(rate_hz * duration_s)
+
+
+def _longest_run(series: TimeSeries, quantity: ShockQuantity) -> int:
+    _require_accelerations(series.channels, quantity)
     measured = require_measured(series)
-    lines_hz = _lines(series, measured, band_hz, lines_an_octave, frequencies_hz)
-    bank = _Bank(lines_hz=lines_hz, rate_hz=series.sample_rate_hz, q=q, quantity=quantity)
-    rows = [_of_channel(bank, values, mask, offset) for values, mask in zip(series.values, measured, strict=True)]
-    units = [_unit(channel.unit, quantity) for channel in series.channels]
-    return ShockResponse(
-        frequency_hz=lines_hz,
-        positive=np.stack([row.highest for row in rows]),
-        negative=np.stack([-row.lowest for row in rows]),
-        quantity=quantity,
-        q=q,
-        channels=tuple(replace(c, unit=unit, overload=None) for c, unit in zip(series.channels, units, strict=True)),
-        offset=np.array([row.offset for row in rows]),
-        notes=_notes(series, measured, lines_hz),
-    )
+    return max(last - first for row in measured for first, last in channel_runs(row))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Extremes:
-    highest: Real
-    lowest: Real
-    offset: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Bank:
-    """Oscillators of all natural frequencies."""
-
-    lines_hz: Real
-    rate_hz: float
-    q: float
-    quantity: ShockQuantity
-
-    def extremes(self, run: Real) -> tuple[Real, Real]:
-        """Give the highest and the lowest response of each oscillator, at least and at most 0, at rest before."""
-        from scipy.signal import lfilter, resample_poly
-
-        highest, lowest = np.zeros(self.lines_hz.size), np.zeros(self.lines_hz.size)
-        factors = np.exp2(np.ceil(np.log2(np.maximum(POINTS_A_CYCLE * self.lines_hz / self.rate_hz, 1)))).astype(int)
-        for factor in np.unique(factors).tolist():
-            rate_hz = factor * self.rate_hz
-            fine = run if factor == 1 else np.asarray(resample_poly(run, factor, 1))
-            lines = np.flatnonzero(factors == factor)
-            # What is left of the motion after the record has its peaks within a period.
-            longest = ceil(rate_hz / self.lines_hz[lines[0]])
-            padded = np.concatenate([fine, np.zeros(longest)])
-            for line in lines.tolist():
-                b, a = self._coefficients(float(self.lines_hz[line]), rate_hz)
-                response = lfilter(b, a, padded[: fine.size + ceil(rate_hz / self.lines_hz[line])])
-                highest[line], lowest[line] = max(response.max(), 0.0), min(response.min(), 0.0)
-        return highest, lowest
-
-    def _coefficients(self, natural_hz: float, rate_hz: float) -> tuple[Real, Real]:
-        from scipy.signal import cont2discrete
-
-        omega, damping = 2 * np.pi * natural_hz, 1 / (2 * self.q)
-        numerator, scale = {
-            "absolute-acceleration": (np.array([2 * damping, 1.0]), 1.0),
-            "relative-displacement": (np.array([-1.0]), omega**-2),
-            "pseudo-velocity": (np.array([-1.0]), 1 / omega),
-        }[self.quantity]
-        # In units of the natural frequency, so that coefficients are of one size at every frequency.
-        b, a, _ = cont2discrete((numerator, np.array([1.0, 2 * damping, 1.0])), omega / rate_hz, method="foh")
-        return scale * np.ravel(b), np.asarray(a, dtype=np.float64)
-
-
-def _of_channel(bank: _Bank, values: Real, measured: Mask, offset: Offset) -> _Extremes:
-    known = values[measured].astype(np.float64)
-    taken = {"first": float(known[0]), "median": float(np.median(known)), "keep": 0.0}.get(offset)
-    if taken is None:
-        raise EstimateError(f"offset {offset!r} is none of first, median, keep")
-    found = [bank.extremes(values[first:last].astype(np.float64) - taken) for first, last in channel_runs(measured)]
-    return _Extremes(
-        highest=np.max([highest for highest, _ in found], axis=0),
-        lowest=np.min([lowest for _, lowest in found], axis=0),
-        offset=taken,
-    )
+def _medians(source: TimeSeries | Blocks) -> Real:
+    if not isinstance(source, TimeSeries):
+        raise EstimateError(
+            "the median of a record that is read block by block isn't known; take offset first or keep, or a part of "
+            "the record that fits in memory"
+        )
+    rows = zip(source.values, measured_samples(source), strict=True)
+    return np.array([float(np.median(values[mask].astype(np.float64))) for values, mask in rows])
 
 
 def _lines(
-    series: TimeSeries,
-    measured: Mask,
+    sample_rate_hz: float,
+    longest: int | None,
     band_hz: tuple[float, float] | None,
     lines_an_octave: int,
     frequencies_hz: Real | Sequence[float] | None,
 ) -> Real:
-    nyquist_hz = series.sample_rate_hz / 2
+    nyquist_hz = sample_rate_hz / 2
     if frequencies_hz is None:
-        lines_hz = _ladder(series, measured, band_hz, lines_an_octave)
+        lines_hz = _ladder(sample_rate_hz, longest, band_hz, lines_an_octave)
     elif band_hz is not None:
         raise EstimateError("frequencies_hz and band_hz are both given; give one of them")
     else:
@@ -202,11 +372,14 @@ def _lines(
     return lines_hz
 
 
-def _ladder(series: TimeSeries, measured: Mask, band_hz: tuple[float, float] | None, lines_an_octave: int) -> Real:
+def _ladder(
+    sample_rate_hz: float, longest: int | None, band_hz: tuple[float, float] | None, lines_an_octave: int
+) -> Real:
     if band_hz is None:
+        if longest is None:
+            raise EstimateError("blocks don't say how long the record is; give band_hz or frequencies_hz")
         # Slower oscillators see no more of the shock than its change of velocity.
-        longest = max(last - first for row in measured for first, last in channel_runs(row))
-        band_hz = (series.sample_rate_hz / longest, series.sample_rate_hz / RATE_OVER_HIGHEST)
+        band_hz = (sample_rate_hz / longest, sample_rate_hz / RATE_OVER_HIGHEST)
         if longest <= RATE_OVER_HIGHEST:
             raise EstimateError(f"{longest} samples without a gap are too few for a spectrum; read more")
     low_hz, high_hz = band_hz
@@ -223,10 +396,10 @@ def _ladder(series: TimeSeries, measured: Mask, band_hz: tuple[float, float] | N
     return np.asarray(MIDDLE_HZ * np.exp2(np.arange(first, last + 1) / lines_an_octave), dtype=np.float64)
 
 
-def _require_accelerations(series: TimeSeries, quantity: ShockQuantity) -> None:
+def _require_accelerations(channels: Sequence[Channel], quantity: ShockQuantity) -> None:
     # Who says no unit gives an array: its acceleration has the unit of its samples, the rest has none.
     known = (*ACCELERATIONS, "1") if quantity == "absolute-acceleration" else ACCELERATIONS
-    odd = [channel for channel in series.channels if channel.unit not in known]
+    odd = [channel for channel in channels if channel.unit not in known]
     if odd:
         raise EstimateError(
             f"{odd[0].name} is in {odd[0].unit}; a shock response spectrum is of accelerations, in m/s^2: select "
@@ -239,19 +412,3 @@ def _unit(unit: str, quantity: ShockQuantity) -> str:
         return unit
     velocity = integrated(unit)
     return velocity if quantity == "pseudo-velocity" else integrated(velocity)
-
-
-def _notes(series: TimeSeries, measured: Mask, lines_hz: Real) -> tuple[str, ...]:
-    notes = []
-    broken = [c.name for c, row in zip(series.channels, measured, strict=True) if len(list(channel_runs(row))) > 1]
-    if broken:
-        notes.append(
-            f"{', '.join(broken)}: samples are missing; oscillators begin anew after each gap, so that a shock that "
-            "spans one is read too low"
-        )
-    if lines_hz[-1] > series.sample_rate_hz / RATE_OVER_HIGHEST * (1 + 1e-9):
-        notes.append(
-            f"above {series.sample_rate_hz / RATE_OVER_HIGHEST:g} Hz, a tenth of the sample rate, what the sampling "
-            "has cut off may be missing"
-        )
-    return tuple(notes)

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.spectral.shock import srs
-from tests.spectral.made_signals import noise, series
+from tests.spectral.made_signals import blocks, noise, part, series
 
 RATE_HZ = 20_000.0
 PULSE_S, HEIGHT = 0.011, 500.0
@@ -193,3 +193,31 @@ def test_pyyeti_agrees_where_a_period_has_32_samples(theirs, quantity):
     )
     found = srs(series(signal, rate_hz=rate_hz), q=q, quantity=quantity, frequencies_hz=lines_hz, offset="keep")
     np.testing.assert_allclose(found.maximax[0], np.ravel(wanted), rtol=1e-9)
+
+
+@pytest.mark.parametrize("lengths", [[1, 5, 700, 3], [64]])
+def test_blocks_give_what_the_whole_gives(lengths):
+    rng = np.random.default_rng(2)
+    valid = np.ones((3, 4000), dtype=bool)
+    # Channels with gaps of their own, one shorter than what resampling looks back, and one at the very end.
+    valid[0, 1500:1700], valid[0, 1704:1710], valid[1, 1600:1601], valid[2, :7], valid[2, 3995:] = (False,) * 5
+    whole = series(3 + rng.standard_normal((3, 4000)), rate_hz=1000.0, valid=valid)
+    asked = {"frequencies_hz": [2.0, 20.0, 55.0, 180.0, 500.0]}
+    found, expected = srs(blocks(whole, lengths), **asked), srs(whole, **asked)
+    for name in ("positive", "negative", "offset"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-9)
+    assert found.notes == expected.notes
+    # Each run alone, at rest before, tells the same.
+    first, second = (
+        srs(part(whole.select(["b"]), *run), offset="keep", **asked) for run in ((0, 1600), (1601, 4000))
+    )
+    both = srs(whole.select(["b"]), offset="keep", **asked)
+    np.testing.assert_allclose(both.positive, np.maximum(first.positive, second.positive), rtol=1e-9)
+
+
+def test_a_stream_says_what_it_needs():
+    whole = series(np.random.default_rng(2).standard_normal((1, 4000)), rate_hz=1000.0)
+    with pytest.raises(EstimateError, match="blocks don't say how long the record is; give band_hz"):
+        srs(blocks(whole, [100]))
+    with pytest.raises(EstimateError, match="take offset first or keep"):
+        srs(blocks(whole, [100]), band_hz=(1.0, 100.0), offset="median")
