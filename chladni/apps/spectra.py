@@ -1,7 +1,8 @@
 """Power spectral densities and transfer functions of a log or a series, in one call each."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -12,7 +13,6 @@ from chladni.apps.sources import (
     Progress,
     Span,
     Watched,
-    moving_channels,
     no_progress,
     on_one_grid,
     still_note,
@@ -45,7 +45,7 @@ from chladni.spectral.products import PAIRS
 from chladni.spectral.response_advice import longest_segment_s
 from chladni.spectral.segmentation import SHORTEST_SEGMENT
 from chladni.spectral.windows import Window
-from chladni.spectral.zoom import zoom_spectrum
+from chladni.spectral.zoom import zoom_of_blocks
 
 SpectraT = TypeVar("SpectraT", CrossSpectra, PowerSpectralDensity)
 
@@ -332,7 +332,9 @@ def log_deflection(
         raise EstimateError(f"{log.path.name}: {error}") from error
 
 
-def zoomed(log: Log, *, channels: Sequence[str] | None, span: Span, **options: Any) -> tuple[AmplitudeSpectrum, ...]:
+def zoomed(
+    log: Log, *, channels: Sequence[str] | None, span: Span, progress: Progress = no_progress, **options: Any
+) -> tuple[AmplitudeSpectrum, ...]:
     """Zoom into named channels, or all that change, one value for each sampling grid; options are `zoom_spectrum`'s.
 
     Raises
@@ -342,19 +344,29 @@ def zoomed(log: Log, *, channels: Sequence[str] | None, span: Span, **options: A
     EstimateError
         As `zoom_spectrum` does.
     """
-    groups = log.read_groups(channels, start_s=span.start_s, end_s=span.end_s)
+    found = []
+    for grid in watched_grids(log, channels, span, progress=progress):
+        try:
+            found.append((zoom_of_blocks(partial(iter, grid), **options), set(grid.constant())))
+        except EstimateError as error:
+            raise EstimateError(f"{log.path.name}: {error}") from error
     if channels is None:
-        kept = [moving_channels(one) for one in groups]
-        groups = tuple(one.select(names) for one, names in zip(groups, kept, strict=True) if names) or groups
-    try:
-        return tuple(_told_still(zoom_spectrum(one, **options), one) for one in groups)
-    except EstimateError as error:
-        raise EstimateError(f"{log.path.name}: {error}") from error
+        moving = tuple(one for spectrum, still in found if (one := _without(spectrum, still)) is not None)
+        if moving:
+            return moving
+    return tuple(_told_still(spectrum, still) for spectrum, still in found)
 
 
-def _told_still(found: AmplitudeSpectrum, series: TimeSeries) -> AmplitudeSpectrum:
-    moving = moving_channels(series)
-    note = still_note([channel.name for channel in series.channels if channel.name not in moving])
+def _without(found: AmplitudeSpectrum, still: Collection[str]) -> AmplitudeSpectrum | None:
+    rows = [row for row, channel in enumerate(found.channels) if channel.name not in still]
+    if not rows:
+        return None
+    channels = tuple(found.channels[row] for row in rows)
+    return replace(found, values=found.values[rows], std=found.std[rows], channels=channels)
+
+
+def _told_still(found: AmplitudeSpectrum, still: Collection[str]) -> AmplitudeSpectrum:
+    note = still_note([channel.name for channel in found.channels if channel.name in still])
     return replace(found, provenance=found.provenance.with_notes(*note))
 
 

@@ -38,10 +38,17 @@ def zoom(
     from chladni.apps.spectra import zoomed
 
     out = Output.of_log([log, opener.setup], json=json, figures=figures)
-    with opener(log) as opened:
+    with opener(log) as opened, out.progress(log.name) as progress:
         span = Span(start_s=start, end_s=end)
         found = zoomed(
-            opened, channels=channel, span=span, band_hz=band, lines=lines, window=window, quantity=quantity
+            opened,
+            channels=channel,
+            span=span,
+            progress=progress,
+            band_hz=band,
+            lines=lines,
+            window=window,
+            quantity=quantity,
         )
         told = reading_sentences(opened, everything=channel is None)
     _print_highest(out, found)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from chladni.signals.errors import EstimateError
-from chladni.spectral.zoom import zoom_spectrum
-from tests.spectral.made_signals import noise, series
+from chladni.spectral import zoom
+from chladni.spectral.zoom import zoom_of_blocks, zoom_spectrum
+from tests.spectral.made_signals import blocks, noise, series
 
 RATE_HZ = 1000.0
 
@@ -53,3 +54,23 @@ def test_the_longest_run_without_a_gap_is_taken():
 def test_what_is_no_band_is_refused(options, words):
     with pytest.raises(EstimateError, match=words):
         zoom_spectrum(series(noise(1, 100), rate_hz=RATE_HZ), **options)
+
+
+def test_blocks_give_what_the_whole_gives():
+    x = noise(2, 9000)
+    x[1, 900] = np.nan
+    whole = series(x, rate_hz=RATE_HZ)
+    found = zoom_of_blocks(lambda: blocks(whole, [500, 401, 3000]), band_hz=(10.0, 20.0), lines=50)
+    expected = zoom_spectrum(whole, band_hz=(10.0, 20.0), lines=50)
+    np.testing.assert_allclose(found.values, expected.values, rtol=1e-9)
+    assert found.provenance == expected.provenance
+
+
+def test_a_window_of_a_long_record_is_laid_between_samples_of_a_shorter_one(monkeypatch):
+    x = series(noise(1, 30_000), rate_hz=RATE_HZ)
+    expected = zoom_spectrum(x, band_hz=(10.0, 20.0), lines=50)
+    monkeypatch.setattr(zoom, "LONGEST_WINDOW", 1 << 12)
+    monkeypatch.setattr(zoom, "SAMPLES_AT_ONCE", 1 << 10)
+    found = zoom_spectrum(x, band_hz=(10.0, 20.0), lines=50)
+    # A cosine by straight lines between 4096 points is (2 pi / 4096)^2 / 8 = 3e-7 off at most.
+    np.testing.assert_allclose(found.values, expected.values, atol=1e-6 * expected.values.max())
