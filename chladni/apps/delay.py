@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from chladni.apps.sources import Span, joined, moving_channels
+from chladni.apps.sources import Span, joined, moving_channels, require_fitting
 from chladni.io.log import Log
 from chladni.signals.cross_correlation import TimeDelays
 from chladni.signals.errors import EstimateError
@@ -37,7 +37,9 @@ def log_delays(
     if responses is None:
         series = _of_its_unit(log, first, span)
     else:
-        series, notes = joined(log, list(dict.fromkeys([first, *log.names(responses)])), span)
+        names = list(dict.fromkeys([first, *log.names(responses)]))
+        require_fitting(log, names, span, work="a delay")
+        series, notes = joined(log, names, span)
     try:
         found = time_delay(
             series,
@@ -52,11 +54,13 @@ def log_delays(
 
 
 def _of_its_unit(log: Log, reference: str, span: Span) -> TimeSeries:
-    for series in log.read_groups(None, start_s=span.start_s, end_s=span.end_s):
-        names = [channel.name for channel in series.channels]
-        if reference in names:
-            unit = series.channels[names.index(reference)].unit
+    units = {channel.name: channel.unit for channel in log.channels}
+    for grid in log.grids(None, start_s=span.start_s, end_s=span.end_s):
+        if reference in grid.names:
+            alike = [name for name in grid.names if units[name] == units[reference]]
+            require_fitting(log, alike, span, work="a delay")
+            (series,) = log.read_groups(alike, start_s=span.start_s, end_s=span.end_s)
             # A channel that never changes has no delay.
-            others = [name for name in moving_channels(series) if series.channels[names.index(name)].unit == unit]
-            return series.select(list(dict.fromkeys((reference, *others))))
+            return series.select(list(dict.fromkeys((reference, *moving_channels(series)))))
+    require_fitting(log, [reference], span, work="a delay")
     return log.read([reference], start_s=span.start_s, end_s=span.end_s)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from chladni.apps.sources import Span, moving_channels
+from chladni.apps.sources import Span, moving_channels, require_fitting
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import EstimateError
@@ -69,6 +69,7 @@ def track_orders(
         When no channel is left to track, or an argument is out of its range.
     """
     name = log.name(shaft)
+    require_fitting(log, None if channels is None else [name, *log.names(channels)], span, work="order tracking")
     (told,) = log.read_groups([name], start_s=span.start_s, end_s=span.end_s)
     try:
         turned = rotation(told, **({telling: name} | how))

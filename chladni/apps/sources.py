@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
-from chladni.io.log_reader import MostlyEmptyError, several_grids
+from chladni.io.log_reader import MostlyEmptyError, SampleGrid, several_grids
 from chladni.io.source import block_seconds, is_small
 from chladni.signals.errors import LogError
 from chladni.signals.resampling import JoinMethod, join_note, join_resampled
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import counted
 
 Progress = Callable[[float], None]
+#: Samples that are held as a whole: a gigabyte, and a few times as much of what is made of them.
+MOST_VALUES = 1 << 27
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,6 +113,40 @@ def _with_moments(known: tuple[int, float, float], row: NDArray[np.floating]) ->
     return total, mean + apart * finite.size / total, squares
 
 
+def require_fitting(log: Log, channels: Sequence[str] | None, span: Span, *, work: str) -> None:
+    """Refuse to hold channels in memory as a whole that don't fit there with what is made of them.
+
+    Raises
+    ------
+    LogError
+        When there are more than `MOST_VALUES` samples.
+    """
+    if is_small(log):
+        return
+    grids = log.grids(channels, start_s=span.start_s, end_s=span.end_s)
+    values = sum(len(grid.names) * grid.samples for grid in grids)
+    if values > MOST_VALUES:
+        count = sum(len(grid.names) for grid in grids)
+        share_s = max(grid.duration_s for grid in grids) * MOST_VALUES / values
+        raise LogError(
+            f"{log.path.name}: {work} takes all samples at once, and {values:.3g} of {counted(count, 'channel')} are "
+            f"more than the {MOST_VALUES} that fit in memory; name fewer channels, or a part of {share_s:.3g} s or "
+            "less (--start, --end)"
+        )
+
+
+class _Blocks:
+    """Blocks of one sampling grid, read from the first on as often as they are asked for."""
+
+    def __init__(self, log: Log, grid: SampleGrid, span: Span) -> None:
+        self._log, self._grid, self._span = log, grid, span
+
+    def __iter__(self) -> Iterator[TimeSeries]:
+        seconds = block_seconds(len(self._grid.names), self._grid.sample_rate_hz)
+        span = self._span
+        return iter(self._log.blocks(self._grid.names, seconds=seconds, start_s=span.start_s, end_s=span.end_s))
+
+
 def watched_grids(
     log: Log, channels: Sequence[str] | None, span: Span, *, progress: Progress = no_progress
 ) -> Iterator[Watched]:
@@ -122,9 +159,7 @@ def watched_grids(
                 yield Watched(names, (series,), duration_s=series.duration_s, progress=progress)
             return
     for grid in log.grids(channels, start_s=span.start_s, end_s=span.end_s):
-        seconds = block_seconds(len(grid.names), grid.sample_rate_hz)
-        blocks = log.blocks(grid.names, seconds=seconds, start_s=span.start_s, end_s=span.end_s)
-        yield Watched(grid.names, blocks, duration_s=grid.duration_s, progress=progress)
+        yield Watched(grid.names, _Blocks(log, grid, span), duration_s=grid.duration_s, progress=progress)
 
 
 def on_one_grid(log: Log, names: Sequence[str], span: Span, *, progress: Progress = no_progress) -> Watched:

@@ -78,3 +78,34 @@ def test_bad_options_are_told_in_one_line(run, walk, command, options, words):
     refused = run(command, walk, *options)
     assert (refused.code, refused.err.count("\n")) == (2, 1)
     assert words in refused.err
+
+
+@pytest.mark.parametrize(
+    ("command", "listed", "numbers"),
+    [("srs", "channels", "maximax"), ("zoom --band 35-45 --lines 50", "channels", "amplitude")],
+)
+def test_a_large_log_is_read_in_blocks(run, walk, monkeypatch, command, listed, numbers):
+    asked = (*command.split()[:1], walk, *command.split()[1:], "--channel", BASE, "--channel", ARM, "--json", "-")
+    whole = run(*asked).document[listed]
+    monkeypatch.setattr("chladni.io.source.IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr("chladni.io.source.VALUES_IN_A_BLOCK", 3000)
+    parts = run(*asked).document[listed]
+    assert [one["name"] for one in parts] == [one["name"] for one in whole] == [BASE, ARM]
+    for one, other in zip(parts, whole, strict=True):
+        np.testing.assert_allclose(one[numbers], other[numbers], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "command", [f"delay --reference {BASE}", f"delay --reference {BASE} --response {ARM}", f"orders --ridge {BASE}"]
+)
+def test_what_needs_a_whole_record_names_the_part_that_fits(run, walk, monkeypatch, command):
+    monkeypatch.setattr("chladni.io.source.IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr("chladni.apps.sources.MOST_VALUES", 12_000)
+    first, *rest = command.split()
+    refused = run(first, walk, *rest, "--channel", ARM) if first == "orders" else run(first, walk, *rest)
+    assert (refused.code, refused.err.count("\n")) == (2, 1)
+    assert "4e+04 of 2 channels are more than the 12000 that fit in memory" in refused.err
+    assert "a part of 12 s or less (--start, --end)" in refused.err
+    if first == "delay":
+        advised = run(first, walk, *rest, "--end", 12)
+        assert advised.code == 0, advised.err
