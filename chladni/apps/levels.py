@@ -9,7 +9,7 @@ from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import EstimateError
 from chladni.signals.levels import Levels, RunningLevels, Severity
-from chladni.signals.time_series import TimeSeries
+from chladni.spectral.blocks import leading_part, sum_up
 from chladni.spectral.levels import LevelsAccumulator
 from chladni.spectral.severity import Machine, SeverityAccumulator, is_motion
 
@@ -99,10 +99,8 @@ def _of_grid(
     grid: Watched, bands_hz: Bands, running_s: float | None, machine: Machine | None, slow: bool, notes: list[str]
 ) -> tuple[Levels, Severity | None]:
     """Both measures of one sampling grid in one reading; a note says why there is no severity."""
-    blocks = iter(grid)
-    first = next(blocks, None)
-    if first is None:
-        raise EstimateError("there is no sample; choose a time window in which the log has data")
+    lead, blocks = leading_part(grid, 1)
+    first = lead[0]
     measured = LevelsAccumulator(first.channels, first.sample_rate_hz, bands_hz=bands_hz, running_s=running_s)
     judged = None
     if any(is_motion(channel) for channel in first.channels):
@@ -110,21 +108,13 @@ def _of_grid(
             judged = SeverityAccumulator(first.channels, first.sample_rate_hz, machine=machine, slow=slow)
         except EstimateError as error:
             notes.append(f"no severity of {some_of(grid.names)}: {error}")
-    _update(measured, judged, first)
-    for block in blocks:
-        _update(measured, judged, block)
+    sum_up(blocks, measured, *([] if judged is None else [judged]))
     found = measured.result()
     try:
         return found, None if judged is None else judged.result()
     except EstimateError as error:
         notes.append(f"no severity of {some_of(grid.names)}: {error}")
         return found, None
-
-
-def _update(measured: LevelsAccumulator, judged: SeverityAccumulator | None, block: TimeSeries) -> None:
-    measured.update(block)
-    if judged is not None:
-        judged.update(block)
 
 
 def levels_document(found: LogLevels) -> Document:

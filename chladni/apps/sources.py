@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.io.log_reader import MostlyEmptyError, SampleGrid, several_grids
 from chladni.io.source import block_seconds, is_small
+from chladni.signals.arrays import Real
 from chladni.signals.errors import LogError
 from chladni.signals.resampling import JoinMethod, join_note, join_resampled
 from chladni.signals.time_series import TimeSeries
@@ -24,11 +26,22 @@ MOST_VALUES = 1 << 27
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Span:
-    """Part of a log, in seconds from its start (None for its ends), and how its sampling grids become one."""
+    """Part of a log, in seconds from its start (None for its ends), and how its sampling grids become one.
+
+    With a share, grids come as `Divided`: what is summed of them is summed by several computers.
+    """
 
     start_s: float | None = None
     end_s: float | None = None
     join: JoinMethod = "auto"
+    share: "Share | None" = None
+
+
+class Share(Protocol):
+    """Gives the grids of a log that several computers share."""
+
+    def grids(self, log: Log, channels: Sequence[str] | None, span: Span) -> "Iterator[Watched]":
+        """Give what `watched_grids` gives, divided."""
 
 
 def no_progress(share: float) -> None:
@@ -69,7 +82,7 @@ class Watched:
         self._progress = progress
         self._lowest: dict[str, float] = {}
         self._highest: dict[str, float] = {}
-        self._moments: dict[str, tuple[int, float, float]] = {}
+        self._moments: dict[str, tuple[float, float, float]] = {}
 
     def __iter__(self) -> Iterator[TimeSeries]:
         done_s = 0.0
@@ -88,6 +101,24 @@ class Watched:
         samples, _, squares = self._moments.get(name, (0, 0.0, 0.0))
         return squares / samples if samples else 0.0
 
+    def seen(self) -> Real:
+        """``[channel, 5]`` lowest and highest sample, number of samples, mean, sum of squared deviations."""
+        lowest, highest, moments = self._lowest, self._highest, self._moments
+        rows = [(lowest.get(n, np.inf), highest.get(n, -np.inf), *moments.get(n, _NOTHING)) for n in self.names]
+        return np.array(rows, np.float64).reshape(-1, 5)
+
+    def add_seen(self, found: Real) -> None:
+        """Take in what another one has `seen` of the same channels."""
+        for name, (low, high, *moments) in zip(self.names, found.tolist(), strict=True):
+            if low <= high:
+                self._lowest[name] = min(low, self._lowest.get(name, np.inf))
+                self._highest[name] = max(high, self._highest.get(name, -np.inf))
+            else:
+                # All its samples are missing: it's known, and shows no motion.
+                self._lowest.setdefault(name, np.inf)
+                self._highest.setdefault(name, -np.inf)
+            self._moments[name] = _together(self._moments.get(name, _NOTHING), (moments[0], moments[1], moments[2]))
+
     def _watch(self, block: TimeSeries) -> None:
         # fmin and fmax look past the NaN of missing samples.
         lowest = np.fmin.reduce(block.values, axis=1, initial=np.inf)
@@ -96,21 +127,31 @@ class Watched:
             self._lowest[channel.name] = min(low, self._lowest.get(channel.name, np.inf))
             self._highest[channel.name] = max(high, self._highest.get(channel.name, -np.inf))
         for channel, row in zip(block.channels, block.values, strict=True):
-            self._moments[channel.name] = _with_moments(self._moments.get(channel.name, (0, 0.0, 0.0)), row)
+            self._moments[channel.name] = _with_moments(self._moments.get(channel.name, _NOTHING), row)
 
 
-def _with_moments(known: tuple[int, float, float], row: NDArray[np.floating]) -> tuple[int, float, float]:
-    """Add samples to a count, a mean and a sum of squared deviations (Chan, Golub & LeVeque 1983, eq. 2.1)."""
+_Moments = tuple[float, float, float]
+_NOTHING: _Moments = (0, 0.0, 0.0)
+
+
+def _with_moments(known: _Moments, row: NDArray[np.floating]) -> _Moments:
+    """Add samples to a count, a mean and a sum of squared deviations."""
     finite = row[np.isfinite(row)].astype(np.float64, copy=False)
     if not finite.size:
         return known
-    samples, mean, squares = known
     # Values too large to square are refused by name when they are averaged; here they only make an infinite variance.
     with np.errstate(over="ignore", invalid="ignore"):
-        fresh_mean = float(finite.mean())
-        apart, total = fresh_mean - mean, samples + finite.size
-        squares += float(np.square(finite - fresh_mean).sum()) + apart * apart * samples * finite.size / total
-    return total, mean + apart * finite.size / total, squares
+        mean = float(finite.mean())
+        return _together(known, (finite.size, mean, float(np.square(finite - mean).sum())))
+
+
+def _together(known: _Moments, more: _Moments) -> _Moments:
+    """Merge counts, means and sums of squared deviations (Chan, Golub & LeVeque 1983, eq. 2.1)."""
+    (samples, mean, squares), (fresh, fresh_mean, fresh_squares) = known, more
+    if not fresh:
+        return known
+    apart, total = fresh_mean - mean, samples + fresh
+    return total, mean + apart * fresh / total, squares + (fresh_squares + apart * apart * samples * fresh / total)
 
 
 def require_fitting(log: Log, channels: Sequence[str] | None, span: Span, *, work: str) -> None:
@@ -151,6 +192,9 @@ def watched_grids(
     log: Log, channels: Sequence[str] | None, span: Span, *, progress: Progress = no_progress
 ) -> Iterator[Watched]:
     """Give the log's channels, one stream of blocks for each sampling grid."""
+    if span.share is not None:
+        yield from span.share.grids(log, channels, span)
+        return
     if is_small(log):
         # Long pauses take memory, which blocks do without.
         with suppress(MostlyEmptyError):

@@ -372,7 +372,8 @@ def _told_still(found: AmplitudeSpectrum, still: Collection[str]) -> AmplitudeSp
 
 def _told_excitations(source: Log | TimeSeries, span: Span) -> tuple[str, ...]:
     try:
-        return excitation_names(source, span)
+        # Parts must not choose differently, so each looks at all of the candidates.
+        return excitation_names(source, replace(span, share=None))
     except EstimateError as error:
         raise EstimateError(f"{source.path.name}: {error}" if isinstance(source, Log) else str(error)) from error
 

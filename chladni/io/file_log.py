@@ -140,13 +140,15 @@ class FileLog(Log):
         seconds: float,
         start_s: float | None = None,
         end_s: float | None = None,
+        between: tuple[int, int] | None = None,
     ) -> Iterator[TimeSeries]:
         """Give channels block by block; see `Log.blocks`."""
         if not (isfinite(seconds) and seconds > 0):
             raise LogError(f"blocks of {seconds} s: seconds must be finite and positive")
         whole = self.read(paths, start_s=start_s, end_s=end_s)
+        whole = whole if between is None else whole.samples_between(*between)
         size = max(1, round(seconds * whole.sample_rate_hz))
-        return (_part(whole, first, first + size) for first in range(0, whole.samples, size))
+        return (whole.samples_between(first, first + size) for first in range(0, whole.samples, size))
 
     def grids(
         self, paths: Sequence[str] | None = None, *, start_s: float | None = None, end_s: float | None = None
@@ -235,21 +237,18 @@ def _within(series: TimeSeries, start_ns: int | None, end_ns: int | None) -> Tim
         whole if time_ns is None else int(np.clip(_index(series, time_ns), 0, series.samples))
         for time_ns, whole in ((start_ns, 0), (end_ns, series.samples))
     )
-    return None if first >= last else series if (first, last) == (0, series.samples) else _part(series, first, last)
+    return (
+        None
+        if first >= last
+        else series
+        if (first, last) == (0, series.samples)
+        else series.samples_between(first, last)
+    )
 
 
 def _index(series: TimeSeries, time_ns: int) -> int:
     # A time within a thousandth of a sample of the grid means that sample, whatever floating point says.
     return int(np.ceil((time_ns - series.start_time_ns) / NS_PER_S * series.sample_rate_hz - 1e-3))
-
-
-def _part(series: TimeSeries, first: int, last: int) -> TimeSeries:
-    return replace(
-        series,
-        values=series.values[:, first:last],
-        valid=None if series.valid is None else series.valid[:, first:last],
-        start_time_ns=series.start_time_ns + round(first / series.sample_rate_hz * NS_PER_S),
-    )
 
 
 def _ordered(series: TimeSeries, names: Sequence[str] | None) -> TimeSeries:

@@ -123,7 +123,7 @@ class BlockGrid:
 
 def complete(lowest: Whole, last: int) -> Whole:
     """For each piece the grid index below which no later piece has a sample, from the lowest index of each."""
-    following = np.append(lowest[1:], last)
+    following = np.append(lowest[1:], last)[: lowest.size]
     return np.minimum.accumulate(following[::-1])[::-1]
 
 
@@ -150,3 +150,6 @@ def blocks_of(grid: BlockGrid, pieces: Iterable[PlacedPiece], below: Whole) -> I
         while done < grid.count and grid.end(done) <= complete_to:
             yield (filling.pop(done, None) or grid.buffer(done)).series()
             done += 1
+    # Where no piece has a sample of the stretch, all of it is a gap.
+    for number in range(done, grid.count):
+        yield grid.buffer(number).series()

@@ -269,6 +269,7 @@ class Log(ABC):
         seconds: float,
         start_s: float | None = None,
         end_s: float | None = None,
+        between: tuple[int, int] | None = None,
     ) -> Iterator[TimeSeries]:
         """Read channels block by block; the blocks one after another are what `read` gives.
 
@@ -280,6 +281,9 @@ class Log(ABC):
             Length of a block; the last one may be shorter.
         start_s, end_s
             As for `read`.
+        between
+            Only samples from the first to before the second number, counted from the first sample that is given
+            without; of the others little more than the stamps is read.
 
         Raises
         ------

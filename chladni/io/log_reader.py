@@ -18,7 +18,7 @@ from chladni.io.placement import Placement, StatedRate, lowest_index
 from chladni.io.repeats import digests_of
 from chladni.io.shared_grid import ALIGNED, Group, group_placements
 from chladni.io.stream import Piece, Stream, read_pieces
-from chladni.signals.arrays import Whole
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
@@ -108,12 +108,15 @@ class FirstPass:
         One for each stream, in their order.
     sizes
         Stream and number of messages of each piece, in the order of the file.
+    every
+        Number of messages of each piece before empty ones, and those outside the window, were left out.
     dtype
         That holds the samples.
     """
 
     placements: tuple[Placement, ...]
     sizes: tuple[tuple[int, int], ...]
+    every: tuple[int, ...]
     dtype: np.dtype[Any]
 
 
@@ -156,15 +159,22 @@ class LogReader:
     rate_hz: float | None = None
     log_start_ns: int = 0
 
-    def pieces(self, *, with_values: bool = True) -> Iterator[tuple[int, Piece]]:
-        """What each batch of messages holds of each stream, inside the window, in the order of the file."""
+    def pieces(
+        self, *, with_values: bool = True, every: list[int] | None = None, wanted: Sequence[bool] | None = None
+    ) -> Iterator[tuple[int, Piece]]:
+        """What each batch of messages holds of each stream, inside the window, in the order of the file.
+
+        Sizes of all pieces are noted in `every`, see `FirstPass`; of those that aren't `wanted` nothing is decoded.
+        """
         found = read_pieces(
             self.container,
             self.streams,
             start_ns=self.window.log_start_ns,
             end_ns=self.window.log_end_ns,
             with_values=with_values,
+            wanted=wanted,
         )
+        found = found if every is None else _sized(found, every)
         if self.known_clocks:
             found = running_on(self.streams, found, self.known_clocks)
         lost = LostMessages()
@@ -200,8 +210,15 @@ class LogReader:
 
     def first_pass(self) -> "FirstPass":
         """Read stamps alone and fit the time bases: all that must be known before blocks can be given."""
+        every: list[int] = []
         sizes: list[tuple[int, int]] = []
-        gatherings = gather(self.streams, _sized(self.pieces(with_values=False), sizes), with_values=False)
+
+        def pieces() -> Iterator[tuple[int, Piece]]:
+            for number, piece in self.pieces(with_values=False, every=every):
+                sizes.append((number, piece.stamps_ns.size))
+                yield number, piece
+
+        gatherings = gather(self.streams, pieces(), with_values=False)
         alike = {number for number, one in enumerate(gatherings) if one.stamps_alike}
         if alike:
             # Whether their samples are alike, too, takes reading them; a log with such stamps is rare.
@@ -211,6 +228,7 @@ class LogReader:
         return FirstPass(
             placements=self._placements(gatherings),
             sizes=tuple(sizes),
+            every=tuple(every),
             dtype=np.result_type(*(one.dtype for one in gatherings)),
         )
 
@@ -225,8 +243,10 @@ class LogReader:
         self.lost.merge(lost)
         return placements
 
-    def blocks(self, known: "FirstPass", seconds: float) -> Iterator[TimeSeries]:
-        """Everything, block by block, in a second pass.
+    def blocks(
+        self, known: "FirstPass", seconds: float, between: tuple[int, int] | None = None
+    ) -> Iterator[TimeSeries]:
+        """Everything, or what lies between two numbers of samples, block by block, in a second pass.
 
         Raises
         ------
@@ -235,6 +255,8 @@ class LogReader:
         """
         group = self.one_group(self.groups(known.placements))
         first, last = group.extent(self.window.start_ns, self.window.end_ns)
+        if between is not None:
+            first, last = (min(first + max(one, 0), last) for one in between)
         rows = grid_rows(group, self.order)
         grid = BlockGrid(
             group=group,
@@ -246,9 +268,19 @@ class LogReader:
         )
         members = {id(one.stream): number for number, one in enumerate(group.placements)}
         member_of = [members.get(id(one.stream)) for one in known.placements]
-        lowest, highest = _extents(known.sizes, member_of, group.placements)
+        parts = _parts(known.sizes, member_of)
+        lowest, highest = _extents(parts, group.placements)
+        wanted = None
+        # Where stamps or a window decide what a piece holds, each has to be decoded.
+        if between is not None and self.window == Window() and not self.known_clocks:
+            needed = (lowest < last) & (highest > first)
+            wanted = _among_every(known.every, needed)
+            parts = [part for part, needs in zip(parts, needed.tolist(), strict=True) if needs]
+            lowest, highest = lowest[needed], highest[needed]
+        mine = np.array([part[0] is not None for part in parts], bool)
+        lowest, highest = lowest[mine], highest[mine]
         return chain.from_iterable(
-            blocks_of(part, self._placed(member_of, group.placements, rows.rows), complete(lowest, last))
+            blocks_of(part, self._placed(parts, wanted, group.placements, rows.rows), complete(lowest, last))
             for part in grid.parts(lowest, highest)
         )
 
@@ -373,19 +405,20 @@ class LogReader:
 
     def _placed(
         self,
-        member_of: Sequence[int | None],
+        parts: Sequence["_Part"],
+        wanted: Sequence[bool] | None,
         placements: Sequence[Placement],
         rows: Sequence[tuple[int, ...]],
     ) -> Iterator[PlacedPiece]:
-        """Read all samples a second time, now with their places."""
-        starts = [0] * len(placements)
-        for stream, piece in self.pieces():
-            member = member_of[stream]
-            if member is None:
-                continue
-            part = slice(starts[member], starts[member] + piece.stamps_ns.size)
-            starts[member] = part.stop
-            yield PlacedPiece(rows=rows[member], index=placements[member].samples_index(part), values=piece.values)
+        """Read samples a second time, now with their places."""
+        for (member, part), (_, piece) in zip(parts, self.pieces(wanted=wanted), strict=True):
+            if member is not None:
+                index = placements[member].samples_index(part)
+                yield PlacedPiece(rows=rows[member], index=index, values=piece.values)
+
+
+#: The placement that a piece belongs to, if any, and which of its messages the piece holds.
+_Part = tuple[int | None, slice]
 
 
 def _values_on(group: Group, extent: tuple[int, int]) -> int:
@@ -425,28 +458,42 @@ def _names(channels: Sequence[Channel]) -> str:
     return ", ".join(channel.name for channel in channels[:3]) + more
 
 
-def _sized(pieces: Iterable[tuple[int, Piece]], sizes: list[tuple[int, int]]) -> Iterator[tuple[int, Piece]]:
-    """Note the stream and the number of messages of each piece in passing."""
+def _sized(pieces: Iterable[tuple[int, Piece]], sizes: list[int]) -> Iterator[tuple[int, Piece]]:
+    """Note the number of messages of each piece in passing."""
     for stream, piece in pieces:
-        sizes.append((stream, piece.stamps_ns.size))
+        sizes.append(piece.stamps_ns.size)
         yield stream, piece
 
 
-def _extents(
-    sizes: Sequence[tuple[int, int]], member_of: Sequence[int | None], placements: Sequence[Placement]
-) -> tuple[Whole, Whole]:
-    """Lowest and highest grid index of each piece, in the order of the file."""
-    starts = [0] * len(placements)
-    extents = []
+def _parts(sizes: Sequence[tuple[int, int]], member_of: Sequence[int | None]) -> "list[_Part]":
+    """Where each piece stands among the messages of its placement."""
+    starts: dict[int, int] = {}
+    parts: list[_Part] = []
     for stream, messages in sizes:
         member = member_of[stream]
+        start = 0 if member is None else starts.get(member, 0)
+        parts.append((member, slice(start, start + messages)))
         if member is not None:
-            placement, part = placements[member], slice(starts[member], starts[member] + messages)
-            starts[member] = part.stop
-            ends = (
-                placement.index[part] if placement.counts is None else placement.index[part] + placement.counts[part]
-            )
-            # A piece of which nothing has a place on the grid isn't waited for.
-            extents.append((lowest_index(placement.index[part], otherwise=-NOWHERE), int(ends.max())))
+            starts[member] = start + messages
+    return parts
+
+
+def _extents(parts: "Sequence[_Part]", placements: Sequence[Placement]) -> tuple[Whole, Whole]:
+    """Lowest and highest grid index of each piece, in the order of the file; nowhere for those without placement."""
+    extents = []
+    for member, part in parts:
+        if member is None:
+            extents.append((-NOWHERE, NOWHERE))
+            continue
+        placement = placements[member]
+        ends = placement.index[part] + (1 if placement.counts is None else placement.counts[part])
+        # A piece of which nothing has a place on the grid isn't waited for.
+        extents.append((lowest_index(placement.index[part], otherwise=-NOWHERE), int(ends.max())))
     lowest, highest = np.array(extents, np.int64).reshape(-1, 2).T
     return lowest, highest
+
+
+def _among_every(every: Sequence[int], needed: Mask) -> list[bool]:
+    """Say of each piece, the empty ones among them, whether it's needed; `needed` leaves the empty ones out."""
+    flags = iter(needed.tolist())
+    return [bool(size) and next(flags) for size in every]

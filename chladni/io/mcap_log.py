@@ -157,6 +157,7 @@ class McapLog(Log):
         seconds: float,
         start_s: float | None = None,
         end_s: float | None = None,
+        between: tuple[int, int] | None = None,
     ) -> Iterator[TimeSeries]:
         """Read channels block by block, in memory that doesn't grow with the samples of the log; see `Log.blocks`.
 
@@ -166,7 +167,7 @@ class McapLog(Log):
         if not (isfinite(seconds) and seconds > 0):
             raise LogError(f"blocks of {seconds} s: seconds must be finite and positive")
         reader = self._reader(paths, start_s, end_s)
-        return self._held_open(reader.blocks(self._first_pass(reader), seconds))
+        return self._held_open(reader.blocks(self._first_pass(reader), seconds, between))
 
     def grids(
         self, paths: Sequence[str] | None = None, *, start_s: float | None = None, end_s: float | None = None

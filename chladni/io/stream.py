@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress, repeat
 from typing import Final
 
 import numpy as np
@@ -309,6 +310,7 @@ def read_pieces(
     start_ns: int | None = None,
     end_ns: int | None = None,
     with_values: bool = True,
+    wanted: Sequence[bool] | None = None,
 ) -> Iterator[tuple[int, Piece]]:
     """Read streams in the order of the file.
 
@@ -322,6 +324,8 @@ def read_pieces(
         Only messages with ``start_ns <= log time < end_ns``.
     with_values
         Whether samples are wanted, or only their times.
+    wanted
+        Of each piece that would be given, whether it's to be; None for all.
 
     Yields
     ------
@@ -331,7 +335,7 @@ def read_pieces(
     """
     reader = PieceReader(streams)
     batches = container.batches(reader.channel_ids, start_time_ns=start_ns, end_time_ns=end_ns)
-    yield from reader.pieces(batches, with_values=with_values)
+    yield from reader.pieces(batches, with_values=with_values, wanted=wanted)
 
 
 class PieceReader:
@@ -356,18 +360,31 @@ class PieceReader:
         """MCAP channels whose messages are read."""
         return frozenset(self._readers)
 
-    def pieces(self, batches: Iterable[MessageBatch], *, with_values: bool = True) -> Iterator[tuple[int, Piece]]:
-        """Give the number of a stream and what each batch holds of it, in the order of the batches."""
-        for stretch, batch in numbered(batches):
-            yield from self._of_batch(batch, stretch, with_values=with_values)
+    def pieces(
+        self, batches: Iterable[MessageBatch], *, with_values: bool = True, wanted: Sequence[bool] | None = None
+    ) -> Iterator[tuple[int, Piece]]:
+        """Give the number of a stream and what each batch holds of it, in the order of the batches.
 
-    def _of_batch(self, batch: MessageBatch, stretch: int, *, with_values: bool) -> Iterator[tuple[int, Piece]]:
+        Those that aren't wanted, by their number, are left out; messages of which none is wanted aren't decoded.
+        """
+        flags = repeat(True) if wanted is None else iter(wanted)
+        for stretch, batch in numbered(batches):
+            yield from self._of_batch(batch, stretch, flags, with_values=with_values)
+
+    def _of_batch(
+        self, batch: MessageBatch, stretch: int, flags: Iterator[bool], *, with_values: bool
+    ) -> Iterator[tuple[int, Piece]]:
         reader, streams = self._readers[batch.channel_id], self._streams
-        yield from ((index, streams[index].without(len(batch), why)) for index, why in reader.refused.items())
+        for index, why in reader.refused.items():
+            if next(flags):
+                yield index, streams[index].without(len(batch), why)
         for part in batch.parts(max(1, VALUES_AT_ONCE // max(1, len(reader.leaves)))) if reader.streams else ():
+            wanted = [next(flags) for _ in reader.streams]
+            if not any(wanted):
+                continue
             decoded = streams[reader.streams[0]].topic.decode(part, reader.leaves)
             counted = _Counted()
-            for index in reader.streams:
+            for index in compress(reader.streams, wanted):
                 piece = streams[index].piece(part, decoded, stretch=stretch, with_values=with_values)
                 yield index, counted.once(piece, streams[index])
                 if decoded.reasons or decoded.told:

@@ -216,6 +216,10 @@ class TimeSeries(Value):
             raise EstimateError(
                 f"no sample between {start_s} s and {end_s} s; the series is {self.duration_s:g} s long"
             )
+        return self.samples_between(first, last)
+
+    def samples_between(self, first: int, last: int) -> Self:
+        """Give the samples from number `first` to before number `last`, with their time; no copy."""
         return replace(
             self,
             values=self.values[:, first:last],

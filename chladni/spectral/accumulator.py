@@ -18,6 +18,8 @@ from chladni.signals.number_range import LARGEST, largest_magnitudes, require_in
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import rounded_up
+from chladni.spectral.averaging import require_shapes
+from chladni.spectral.blocks import Margins, Numbers, Own
 from chladni.spectral.held_samples import HeldSamples
 from chladni.spectral.products import PAIRS, POWERS, Products, SpectraT
 from chladni.spectral.segment_spectra import segment_spectra
@@ -106,6 +108,7 @@ class SpectraAccumulator(Generic[SpectraT]):
         # Samples of the unbroken run that later segments still need, and the number its next segment has in the run.
         self._held = HeldSamples()
         self._position = 0
+        self._samples = 0
         # A stream may begin or end as quietly as it likes: what counts is the largest of all.
         self.largest = np.zeros(len(self.channels))
 
@@ -159,6 +162,40 @@ class SpectraAccumulator(Generic[SpectraT]):
         self.count.merge(flushed.count)
         self.stretch.merge(flushed.stretch)
         self.largest = np.maximum(self.largest, flushed.largest)
+
+    @property
+    def margins(self) -> Margins:
+        """Of a part: its last segments reach into the next part."""
+        return Margins(hop=self.segmentation.hop, after=self.segmentation.samples - self.segmentation.hop)
+
+    def begin(self, own: Own) -> None:
+        """See `chladni.spectral.blocks.Accumulator`."""
+        self._samples = own.last
+
+    def numbers(self) -> Numbers:
+        """Give the sums of a part; see `chladni.spectral.blocks.Accumulator`.
+
+        Raises
+        ------
+        EstimateError
+            When the average isn't linear.
+        """
+        with _threads() as executor:
+            flushed = self.flushed(executor)
+        return {**flushed.average.numbers(), "largest": flushed.largest}
+
+    def add_numbers(self, found: Numbers) -> None:
+        """Take in the sums of a part; `EstimateError` when they don't fit."""
+        require_shapes(found, {"largest": self.largest.shape})
+        self.average.add_numbers(found)
+        self.largest = np.maximum(self.largest, found["largest"])
+
+    def settle(self, runs: Sequence[tuple[int, int]]) -> None:
+        """Count the segments, and those that were left out, as in the whole record."""
+        self.stretch = Stretch(self.segmentation)
+        self.stretch.extend_by(self._samples, runs)
+        for first, last in runs:
+            self.count.add(0, self.segmentation.count(last - first))
 
     def result(self, *, sample_rate_hz: float | None = None) -> SpectraT:
         """Give the average so far; more blocks may follow.

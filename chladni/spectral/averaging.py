@@ -1,6 +1,7 @@
 """Sums over segments: linear, exponential in time, and peak hold; of all pairs of channels, or of each alone."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from copy import copy
 from typing import Any, Protocol, Self
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.arrays import Complex, Real, Whole
+from chladni.signals.errors import EstimateError
 from chladni.spectral.segment_spectra import run_all
 
 # Lines handled together, so that a product still sits in the cache when it's added to the sum.
@@ -34,6 +36,19 @@ class SegmentAverage(Protocol):
 
     def mean(self) -> NDArray[Any]:
         """Give ``[channel, channel, frequency]``, conj(X_i) X_j averaged or held, unscaled; or its real diagonal."""
+
+    def numbers(self) -> dict[str, NDArray[Any]]:
+        """Give what was summed, for another one's `add_numbers`; `EstimateError` where that makes no sense."""
+
+    def add_numbers(self, found: Mapping[str, NDArray[Any]]) -> None:
+        """Add what another one gave; `EstimateError` when it doesn't fit."""
+
+
+def require_shapes(found: Mapping[str, NDArray[Any]], shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """Raise `EstimateError` unless sums that came from elsewhere are numbers of these shapes."""
+    for name, shape in shapes.items():
+        if name not in found or found[name].shape != shape or found[name].dtype != np.float64:
+            raise EstimateError(f"sums of a part don't fit: {name} isn't {shape} numbers; do the log anew")
 
 
 class _Sum(ABC):
@@ -85,6 +100,19 @@ class _Sum(ABC):
         parts = np.stack((2 * rows, 2 * rows + 1), axis=1).ravel()
         twin.products = _selected(self.products, parts)
         return twin
+
+    def numbers(self) -> dict[str, NDArray[Any]]:
+        """See `SegmentAverage`."""
+        if self.decay != 1:
+            raise EstimateError("a fading average isn't summed in parts; average linearly")
+        return {"products": self.products, "segments": np.array([self.segments], np.float64)}
+
+    def add_numbers(self, found: Mapping[str, NDArray[Any]]) -> None:
+        """See `SegmentAverage`."""
+        require_shapes(found, {"products": self.products.shape, "segments": (1,)})
+        self.products += found["products"]
+        self.segments += int(found["segments"][0])
+        self.weight += float(found["segments"][0])
 
     def mean(self) -> NDArray[Any]:
         """See `SegmentAverage`."""
@@ -187,6 +215,15 @@ class _Hold(ABC):
         twin = copy(self)
         twin.held = _selected(self.held, rows)
         return twin
+
+    def numbers(self) -> dict[str, NDArray[Any]]:
+        """See `SegmentAverage`."""
+        return {"held": self.held.view(np.float64)}
+
+    def add_numbers(self, found: Mapping[str, NDArray[Any]]) -> None:
+        """See `SegmentAverage`."""
+        require_shapes(found, {"held": self.held.view(np.float64).shape})
+        self._keep_larger(slice(None), np.ascontiguousarray(found["held"]).view(self.held.dtype))
 
     def mean(self) -> NDArray[Any]:
         """See `SegmentAverage`."""

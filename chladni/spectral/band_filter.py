@@ -1,6 +1,6 @@
 """Blocks of a stream band-passed, and integrated, so that they don't depend on where the blocks were cut."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from math import ceil, inf
 
@@ -9,6 +9,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from chladni.signals.arrays import Real
+from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.units import integrated, power
@@ -85,6 +86,16 @@ class BandFilter:
         """How far to either side a sample of the result leans on others, in seconds."""
         return self._reach / self.sample_rate_hz
 
+    @property
+    def reach(self) -> int:
+        """`reach_s` in samples."""
+        return self._reach
+
+    def passed(self, channels: Sequence[Channel]) -> tuple[Channel, ...]:
+        """Give channels as they come out."""
+        # A limit of the sensor is none of what was computed.
+        return tuple(replace(one, unit=self._unit(one.unit), overload=None) for one in channels)
+
     def blocks(self, source: Iterable[TimeSeries]) -> Iterator[TimeSeries]:
         """Filter a whole stream, see `feed`; `EstimateError` when no run is longer than twice `reach_s`."""
         for block in source:
@@ -113,14 +124,22 @@ class BandFilter:
 
     def rest(self) -> Iterator[TimeSeries]:
         """Give what is left at the end of the stream; `EstimateError` when no run was longer than twice `reach_s`."""
+        yield from self.rest_of_part()
+        self.require_long(self._runs.longest)
+
+    def rest_of_part(self) -> Iterator[TimeSeries]:
+        """Give what is left at the end of a part of a stream, which may be nothing."""
         yield from self._filtered()
-        if self._runs.longest <= 2 * self._reach:
+
+    def require_long(self, longest: int) -> None:
+        """Raise `EstimateError` when the longest run has no more samples than twice the filter's reach."""
+        if longest <= 2 * self._reach:
             # The filter is as long as its narrower slope asks for.
             narrow = self.band_hz[1] - self.band_hz[0] < self.band_hz[0]
             remedy = "take a wider band" if narrow else "begin the band at a higher frequency"
             raise EstimateError(
                 f"a band from {self.band_hz[0]:g} to {self.band_hz[1]:g} Hz needs an unbroken run of "
-                f"{2 * self.reach_s:.3g} s, and the longest has {self._runs.longest / self.sample_rate_hz:.3g} s. "
+                f"{2 * self.reach_s:.3g} s, and the longest has {longest / self.sample_rate_hz:.3g} s. "
                 f"Measure longer, or {remedy}"
             )
 
@@ -131,12 +150,10 @@ class BandFilter:
             return
         joined = self._held.joined().astype(np.float64, copy=False)
         start_s = (self._taken + self._reach) / self.sample_rate_hz
-        # A limit of the sensor is none of what was computed.
-        channels = tuple(replace(one, unit=self._unit(one.unit), overload=None) for one in self._first.channels)
         yield TimeSeries(
             values=self._convolved(joined),
             sample_rate_hz=self.sample_rate_hz,
-            channels=channels,
+            channels=self.passed(self._first.channels),
             start_time_ns=self._first.start_time_ns + round(start_s * NS_PER_S),
         )
         self._taken += new

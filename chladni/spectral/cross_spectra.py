@@ -13,7 +13,7 @@ from chladni.spectral.accumulator import (
     SegmentAveraging,
     SpectraAccumulator,
 )
-from chladni.spectral.blocks import Source, leading_part, samples_known
+from chladni.spectral.blocks import Source, leading_part, samples_known, sum_up
 from chladni.spectral.products import SpectraT
 from chladni.spectral.segmentation import SAMPLES_TO_CHOOSE_FROM, Detrend, Segmentation, plan_segmentation
 from chladni.spectral.stretches import run_lengths
@@ -125,6 +125,5 @@ def segment_average(
         detrend=detrend,
     )
     accumulator = make(first.channels, first.sample_rate_hz, plan)
-    for block in blocks:
-        accumulator.update(block)
+    sum_up(blocks, accumulator)
     return accumulator.result()

@@ -1,9 +1,10 @@
 """Levels of a series or a stream of blocks: RMS, peak, crest factor, skewness and kurtosis, over all and running."""
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, Self
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chladni.io.source import Blocks, SeriesLike, blocks_of
 from chladni.signals.arrays import Index, Mask, Real, Whole
@@ -13,8 +14,9 @@ from chladni.signals.levels import Levels, RunningLevels
 from chladni.signals.number_range import LARGEST, require_in_range
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.spectral.accumulator import require_finite
+from chladni.spectral.averaging import require_shapes
 from chladni.spectral.band_filter import BandFilter
-from chladni.spectral.blocks import leading_part
+from chladni.spectral.blocks import Margins, Numbers, Own, leading_part, sum_up
 from chladni.spectral.stretches import valid_runs
 
 # Time constant "fast" of sound and vibration level meters (IEC 61672-1:2013, section 5.8).
@@ -25,6 +27,7 @@ LEAST_SAMPLES = 64
 MOST_WINDOWS = 1024
 # Of the record, to tell the scatter of its RMS.
 BATCHES = 32
+WINDOW_NUMBERS = ("samples", "number", "moments")
 
 
 def levels(
@@ -91,8 +94,7 @@ def levels(
     accumulator = LevelsAccumulator(
         first.channels, first.sample_rate_hz, bands_hz=bands_hz, running_s=running_s, integrations=integrations
     )
-    for block in blocks:
-        accumulator.update(block)
+    sum_up(blocks, accumulator)
     return accumulator.result()
 
 
@@ -123,7 +125,41 @@ class LevelsAccumulator:
         window = max(LEAST_SAMPLES, round((running_s or FAST_S) * sample_rate_hz))
         self._windows = [_Windows(len(self.channels), window) for _ in range(max(1, len(self._filters)))]
         self._start_ns: int | None = None
+        self._put_together = False
         self._passed = self.channels
+        # Of a part of a record; None for all of it.
+        self._own: Own | None = None
+
+    @property
+    def margins(self) -> Margins:
+        """Of a part: as far as the filters reach."""
+        reach = max((one.reach for one in self._filters), default=0)
+        return Margins(before=reach, after=reach)
+
+    def begin(self, own: Own) -> None:
+        """See `chladni.spectral.blocks.Accumulator`."""
+        self._start_ns, self._own = own.start_time_ns, own
+
+    def numbers(self) -> Numbers:
+        """See `chladni.spectral.blocks.Accumulator`."""
+        for filter_, windows in zip(self._filters, self._windows, strict=False):
+            for passed in filter_.rest_of_part():
+                self._add(windows, passed)
+        found = ((place, *named) for place, windows in enumerate(self._windows) for named in windows.numbers())
+        return {f"{place}/{name}": one for place, name, one in found}
+
+    def add_numbers(self, found: Numbers) -> None:
+        """See `chladni.spectral.blocks.Accumulator`; `EstimateError` when they don't fit."""
+        for place, windows in enumerate(self._windows):
+            windows.add_numbers({name: found.get(f"{place}/{name}", np.empty(0)) for name in WINDOW_NUMBERS})
+        self._put_together = True
+
+    def settle(self, runs: Sequence[tuple[int, int]]) -> None:
+        """See `chladni.spectral.blocks.Accumulator`; `EstimateError` when no run was long enough for a filter."""
+        for filter_, windows in zip(self._filters, self._windows, strict=False):
+            if not windows.number.size:
+                filter_.require_long(max((last - first for first, last in runs), default=0))
+            self._passed = filter_.passed(self.channels)
 
     def update(self, block: TimeSeries) -> None:
         """Take in the next block; `EstimateError` when it has other channels, or starts before the last one ended."""
@@ -144,7 +180,7 @@ class LevelsAccumulator:
     def result(self) -> Levels:
         """Give the levels; no more blocks may follow."""
         for filter_, windows in zip(self._filters, self._windows, strict=False):
-            for passed in filter_.rest():
+            for passed in () if self._put_together else filter_.rest():
                 self._add(windows, passed)
         if not any(windows.moments.samples.any() for windows in self._windows):
             raise EstimateError("no sample is a number (all are marked invalid); leave the channels out")
@@ -172,7 +208,11 @@ class LevelsAccumulator:
 
     def _add(self, windows: "_Windows", series: TimeSeries) -> None:
         start_s = (series.start_time_ns - (self._start_ns or 0)) / NS_PER_S
-        windows.add(series, round(start_s * self.sample_rate_hz))
+        first = round(start_s * self.sample_rate_hz)
+        if self._own is not None:
+            low, high = (min(max(one - first, 0), series.samples) for one in (self._own.first, self._own.last))
+            series, first = series.samples_between(low, high), first + low
+        windows.add(series, first)
         self._passed = series.channels
 
     def _bands_hz(self) -> tuple[tuple[float, float], ...]:
@@ -217,6 +257,28 @@ class _Windows:
         fresh = _Moments.of(series.values.astype(np.float64, copy=False), series.valid, starts)
         self.moments = _Moments.joined([self.moments, fresh], lambda arrays: np.concatenate(arrays, axis=-1))
         self.number = np.concatenate([self.number, number])
+        self.coarsen(self.samples)
+        while self.number.size > MOST_WINDOWS:
+            self.coarsen(2 * self.samples)
+
+    def numbers(self) -> Iterator[tuple[str, NDArray[Any]]]:
+        """Give what stands in the windows, for another's `add_numbers`."""
+        yield from zip(WINDOW_NUMBERS, (np.array([self.samples]), self.number, np.stack(self.moments)), strict=True)
+
+    def add_numbers(self, found: Numbers) -> None:
+        """Add later windows, or those of which samples are in the last ones here, too."""
+        samples, number, moments = (found[name] for name in WINDOW_NUMBERS)
+        whole = samples.shape == (1,) and samples.dtype == number.dtype == np.int64 and number.ndim == 1
+        require_shapes({"moments": moments}, {"moments": (*np.stack(self.moments).shape[:2], number.size)})
+        size = int(samples[0]) if whole else 0
+        if not whole or (size % self.samples and self.samples % size) or not np.all(np.diff(number) > 0):
+            raise EstimateError("sums of a part don't fit: they have other windows; do the log anew")
+        other = _Windows(moments.shape[1], size)
+        other.number, other.moments = number, _Moments._make(moments)
+        for one in (self, other):
+            one.coarsen(max(self.samples, size))
+        self.moments = _Moments.joined([self.moments, other.moments], lambda arrays: np.concatenate(arrays, axis=-1))
+        self.number = np.concatenate([self.number, other.number])
         self.coarsen(self.samples)
         while self.number.size > MOST_WINDOWS:
             self.coarsen(2 * self.samples)

@@ -80,7 +80,7 @@ def _average(source: Source, period: Period, products: Products[SpectraT]) -> Sp
     products.require_fitting(len(first.channels), period.samples)
     scatter = _PeriodScatter(products, row=first.index(period.channel), largest=np.zeros(len(first.channels)))
     # A period at a time: memory holds one, and the matrix, however long the log is.
-    for cut in _periods(blocks, period):
+    for cut in _periods(iter(blocks), period):
         scatter.add(cut)
     if scatter.count < 2:
         raise EstimateError(

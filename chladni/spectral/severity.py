@@ -12,7 +12,7 @@ from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.levels import Levels, RunningLevels, Severity
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import shown
-from chladni.spectral.blocks import leading_part
+from chladni.spectral.blocks import Margins, Numbers, Own, leading_part, sum_up
 from chladni.spectral.levels import LevelsAccumulator
 
 Machine = Literal["large-rigid", "large-flexible", "medium-rigid", "medium-flexible"]
@@ -99,8 +99,7 @@ def severity(
     source = blocks_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
     lead, blocks = leading_part(source, 1)
     accumulator = SeverityAccumulator(lead[0].channels, lead[0].sample_rate_hz, machine=machine, slow=slow)
-    for block in blocks:
-        accumulator.update(block)
+    sum_up(blocks, accumulator)
     return accumulator.result()
 
 
@@ -140,6 +139,35 @@ class SeverityAccumulator:
                 "severity needs an acceleration [m/s^2] or a velocity [m/s], and there is none; name the units in a "
                 "setup file"
             )
+
+    @property
+    def margins(self) -> Margins:
+        """Of a part: as far as the filter reaches."""
+        return next(iter(self._measured.values())).margins
+
+    def begin(self, own: Own) -> None:
+        """See `chladni.spectral.blocks.Accumulator`."""
+        for one in self._measured.values():
+            one.begin(own)
+
+    def numbers(self) -> Numbers:
+        """See `chladni.spectral.blocks.Accumulator`."""
+        return {
+            f"{place}/{name}": found
+            for place, one in enumerate(self._measured.values())
+            for name, found in one.numbers().items()
+        }
+
+    def add_numbers(self, found: Numbers) -> None:
+        """See `chladni.spectral.blocks.Accumulator`."""
+        for place, one in enumerate(self._measured.values()):
+            mine = f"{place}/"
+            one.add_numbers({name.removeprefix(mine): some for name, some in found.items() if name.startswith(mine)})
+
+    def settle(self, runs: Sequence[tuple[int, int]]) -> None:
+        """See `chladni.spectral.blocks.Accumulator`."""
+        for one in self._measured.values():
+            one.settle(runs)
 
     def update(self, block: TimeSeries) -> None:
         """Take in the next block."""

@@ -124,6 +124,13 @@ class Stretch:
             # What wasn't recorded isn't skipped: only segments within a stretch are counted.
             self._skipped_before = self.skipped
             self._samples = self._run = self._segments_of_runs = 0
+        self.extend_by(block.samples, runs)
+        self.start_ns = block.start_time_ns if self.start_ns is None else self.start_ns
+        # From this block's own start, so that rounding doesn't add up over blocks.
+        self.end_ns = block.start_time_ns + round(block.samples / block.sample_rate_hz * NS_PER_S)
+
+    def extend_by(self, samples: int, runs: Sequence[Run]) -> None:
+        """Take note of so many samples that follow, and the runs in them."""
         cursor = 0
         for first, last in runs:
             # The run before the gap may have begun in an earlier block.
@@ -132,12 +139,9 @@ class Stretch:
             self._run += last - first
             self.longest_run = max(self.longest_run, self._run)
             cursor = last
-        if cursor < block.samples:
+        if cursor < samples:
             self._close_run()
-        self._samples += block.samples
-        self.start_ns = block.start_time_ns if self.start_ns is None else self.start_ns
-        # From this block's own start, so that rounding doesn't add up over blocks.
-        self.end_ns = block.start_time_ns + round(block.samples / block.sample_rate_hz * NS_PER_S)
+        self._samples += samples
 
     def merge(self, other: Self) -> None:
         """Add what another book has lost; the stretch that is open here goes on."""

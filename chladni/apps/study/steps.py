@@ -1,7 +1,7 @@
 """The steps of a recipe: each gives the document that the command of its name gives for one log."""
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from chladni.apps.documents import Document, frf_document, psd_document
 from chladni.apps.gap_document import gap_document
@@ -9,7 +9,7 @@ from chladni.apps.levels import levels_document, measure_levels
 from chladni.apps.modal_study import modal_study
 from chladni.apps.modes import Wanted
 from chladni.apps.modes_document import modes_document
-from chladni.apps.sources import Span
+from chladni.apps.sources import Share, Span
 from chladni.apps.spectra import Averaging, densities, transfer
 from chladni.io.log import Log
 from chladni.spectral.bands import within
@@ -21,28 +21,32 @@ if TYPE_CHECKING:
     from chladni.robots.robot import Robot
 
 
+#: Steps that are sums over a log, so that several workers may share it.
+DIVIDED: Final = ("psd", "frf", "levels")
+
+
 def info_document(log: Log, _: object, __: object = None) -> Document:
     """Give what ``chladni info`` gives."""
     return log.info().to_json()
 
 
-def densities_document(log: Log, asked: "PsdTable", __: object = None) -> Document:
-    """Give what ``chladni psd`` gives."""
+def densities_document(log: Log, asked: "PsdTable", __: object = None, share: Share | None = None) -> Document:
+    """Give what ``chladni psd`` gives, of sums that are shared where there is a share."""
     averaging = Averaging(resolution_hz=asked.resolution_hz, window=asked.window, overlap=asked.overlap)
-    span = Span(start_s=asked.start_s, end_s=asked.end_s)
+    span = Span(start_s=asked.start_s, end_s=asked.end_s, share=share)
     found = densities(log, channels=asked.channels, averaging=averaging, span=span)
     return psd_document(tuple(within(one, highest_hz=asked.highest_hz) for one in found))
 
 
-def responses_document(log: Log, asked: "FrfTable", __: object = None) -> Document:
-    """Give what ``chladni frf`` gives."""
+def responses_document(log: Log, asked: "FrfTable", __: object = None, share: Share | None = None) -> Document:
+    """Give what ``chladni frf`` gives, of sums that are shared where there is a share."""
     found = transfer(
         log,
         asked.references,
         asked.responses,
         estimator=asked.estimator,
         averaging=Averaging(resolution_hz=asked.resolution_hz, window=asked.window, overlap=asked.overlap),
-        span=Span(start_s=asked.start_s, end_s=asked.end_s, join=asked.join),
+        span=Span(start_s=asked.start_s, end_s=asked.end_s, join=asked.join, share=share),
     )
     found = within(found, highest_hz=asked.highest_hz)
     return frf_document(found, find_response_peaks(found))
@@ -64,8 +68,8 @@ def mode_set_document(log: Log, asked: "ModesTable", __: object = None) -> Docum
     return modes_document(found.modes, found.validation, found.study.relative_motion, found.transmissibility)
 
 
-def log_levels_document(log: Log, asked: "LevelsTable", __: object = None) -> Document:
-    """Give what ``chladni levels`` gives."""
+def log_levels_document(log: Log, asked: "LevelsTable", __: object = None, share: Share | None = None) -> Document:
+    """Give what ``chladni levels`` gives, of sums that are shared where there is a share."""
     found = measure_levels(
         log,
         channels=asked.channels,
@@ -73,7 +77,7 @@ def log_levels_document(log: Log, asked: "LevelsTable", __: object = None) -> Do
         running_s=asked.running_s,
         machine=asked.machine,
         slow=asked.slow,
-        span=Span(start_s=asked.start_s, end_s=asked.end_s),
+        span=Span(start_s=asked.start_s, end_s=asked.end_s, share=share),
     )
     return levels_document(found)
 
@@ -100,7 +104,7 @@ def diagnosis_document(log: Log, asked: "GapTable", model: "Model | Robot | None
 
 
 #: By the name of their table in a recipe.
-DOCUMENTS: Final[Mapping[str, Callable[[Log, Any, Any], Document]]] = {
+DOCUMENTS: Final[Mapping[str, Callable[..., Document]]] = {
     "info": info_document,
     "psd": densities_document,
     "frf": responses_document,

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from chladni.apps.study.cluster import Connect
 from chladni.apps.study.engine import Answer, Engine
+from chladni.apps.study.parts import Sums, parts_of, share, sum_part
 from chladni.apps.study.work import Task, work_on
 from chladni.io.study.folder import StudyFolder, opened_folder
 from chladni.io.study.logs import LogAddress, find_logs
@@ -91,7 +92,7 @@ def run_study(
         report = StudyReport(logs=len(addresses), there=len(addresses) - len(waiting))
         if waiting:
             with connect() as client:
-                _run(Engine(client, partial(work_on, text)), folder, waiting, report, progress)
+                _run(Engine(client, partial(work_on, text)), folder, recipe, waiting, report, progress)
         folder.settle()
     return report
 
@@ -102,10 +103,15 @@ def _is_done(folder: StudyFolder, address: LogAddress) -> bool:
 
 
 def _run(
-    engine: Engine[Task], folder: StudyFolder, waiting: Sequence[LogAddress], report: StudyReport, progress: Progress
+    engine: Engine[Task],
+    folder: StudyFolder,
+    recipe: Recipe,
+    waiting: Sequence[LogAddress],
+    report: StudyReport,
+    progress: Progress,
 ) -> None:
     stamps = {one.url: one for one in waiting}
-    for place, answer in enumerate(_answers(engine, folder, waiting), 1):
+    for place, answer in enumerate(_answers(engine, folder, waiting, recipe, report), 1):
         addresses = [stamps.pop(task.url) for task in answer.items]
         content = answer.content if answer.content is not None else _given_up(answer)
         tables = folder.take(
@@ -121,13 +127,30 @@ def _run(
 _NOTED: Final = ("effort", "logs", "failures")
 
 
-def _answers(engine: Engine[Task], folder: StudyFolder, waiting: Sequence[LogAddress]) -> Iterator[Answer[Task]]:
-    def tasks() -> Iterator[Task]:
-        for one in waiting:
-            known = folder.done.get(one.told)
-            yield Task(one.url, None if known is None else known.content)
+def _answers(
+    engine: Engine[Task], folder: StudyFolder, waiting: Sequence[LogAddress], recipe: Recipe, report: StudyReport
+) -> Iterator[Answer[Task]]:
+    """Do all logs; those that are so large that workers share them come last, one after another."""
+    threads = sum(engine.client.nthreads().values())
+    parts = {one: parts_of(one, recipe.steps, threads) for one in waiting}
+    yield from engine.run(_task(folder, one) for one in waiting if parts[one] == 1)
+    work = partial(sum_part, recipe.to_json())
+    for one in waiting:
+        if parts[one] > 1:
+            sums = share(engine.client, work, one.url, parts[one])
+            report.seconds += sum(part.seconds for part in sums)
+            report.cpu_s += sum(part.cpu_s for part in sums)
+            yield from engine.run([_task(folder, one, sums)])
 
-    return engine.run(tasks())
+
+def _task(folder: StudyFolder, address: LogAddress, sums: Sequence[Sums] = ()) -> Task:
+    known = folder.done.get(address.told)
+    return Task(
+        address.url,
+        None if known is None else known.content,
+        sums=tuple(one.content for one in sums),
+        seen=sums[0].seen if sums else "",
+    )
 
 
 def _note(engine: Engine[Task], report: StudyReport, tables: dict[str, list[dict[str, Any]]]) -> None:

@@ -1,24 +1,22 @@
 """What a worker does: a batch of logs, each by all steps of the recipe, to the bytes of their tables."""
 
-import re
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
-from functools import lru_cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from chladni import __version__
+from chladni.apps.documents import Document
+from chladni.apps.shares import NeedsWholeError
+from chladni.apps.study.parts import read_sums
+from chladni.apps.study.prepared import Prepared, prepared
 from chladni.apps.study.rows import Rows, rows_of
-from chladni.apps.study.steps import DOCUMENTS
-from chladni.io.files.formats import fitting_options
-from chladni.io.log import Log, open_log
-from chladni.io.setup import Setup, load_setup
+from chladni.apps.study.steps import DIVIDED, DOCUMENTS
+from chladni.io.log import Log
 from chladni.io.study.logs import HeldLog, LogAddress, StoreError, held
-from chladni.io.study.recipe import Attached, Recipe
+from chladni.io.study.recipe import Recipe
 from chladni.io.study.tables import packed, tables_of
 from chladni.signals.errors import ChladniError
 from chladni.signals.linear_algebra import in_one_thread
@@ -27,15 +25,6 @@ from chladni.signals.visible import document_text
 _NS_PER_S: Final = 1_000_000_000
 #: A clock that was never set begins at the Unix epoch.
 _FIRST_DAY_NS: Final = 366 * 86_400 * _NS_PER_S
-#: An option that a message advises; those of a whole command that it gives stay as they are.
-_OPTION: Final = re.compile(r"chladni [a-z]+ [^;]*|--[a-z][a-z-]*")
-_KEYS: Final = {
-    "--setup": "setup", "--rate": "[open] sample_rate_hz", "--time": "[open] time", "--time-unit": "[open] time_unit",
-    "--stamp": "[open] stamp", "--unit": "[open] units", "--channel": "channels", "--reference": "references",
-    "--response": "responses", "--resolution": "resolution_hz", "--start": "start_s", "--end": "end_s",
-    "--join": "join", "--operational": "operational = true", "--state": "state", "--command": "command",
-    "--without": "leave_out",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +37,14 @@ class Task:
         See `LogAddress`.
     known
         SHA-256 of the content whose rows are there; None where none are.
+    sums, seen
+        Of a log that was shared: what its parts gave, and of what file.
     """
 
     url: str
     known: str | None = None
+    sums: tuple[bytes, ...] = ()
+    seen: str = ""
 
 
 def work_on(recipe: str, tasks: Sequence[Task]) -> bytes:
@@ -69,64 +62,13 @@ def work_on(recipe: str, tasks: Sequence[Task]) -> bytes:
     bytes
         `packed` tables. A log whose content is the known one has a row of ``effort`` alone.
     """
-    prepared = _prepared(recipe)
+    ready = prepared(recipe)
     rows: Rows = {}
     with in_one_thread():
         for task in tasks:
-            for table, found in _log_rows(prepared, task).items():
+            for table, found in _log_rows(ready, task).items():
                 rows.setdefault(table, []).extend(found)
     return packed(tables_of(rows))
-
-
-class _Prepared:
-    """A recipe with what it names loaded, kept for the batches to come."""
-
-    def __init__(self, recipe: Recipe) -> None:
-        self.recipe = recipe
-        # Errors name the file as the user does, not as it was laid down here.
-        self._folder = TemporaryDirectory(prefix="chladni-recipe-")
-        self.setup: Setup | None = None
-        if recipe.setup is not None:
-            self.setup = load_setup(self._laid_down(recipe.setup))
-        self.model: Any = None
-        if recipe.model is not None:
-            self.model = self._loaded(recipe.model)
-
-    def told(self, text: str) -> str:
-        """Give a message with files called as the user calls them, and keys of the recipe in place of options."""
-        text = _OPTION.sub(lambda found: _KEYS.get(found[0], found[0]), text)
-        for one in (self.recipe.setup, self.recipe.model):
-            if one is not None:
-                text = text.replace(str(self._path(one)), one.path)
-        return text
-
-    def open(self, path: Path) -> Log:
-        """Open a log as the recipe says; of its keys, those that are for this kind of file."""
-        told: dict[str, Any] = self.recipe.file.open.model_dump(exclude_none=True)
-        return open_log(path, setup=self.setup, **fitting_options(path, told))
-
-    def _path(self, attached: Attached) -> Path:
-        return Path(self._folder.name) / Path(attached.path).name
-
-    def _laid_down(self, attached: Attached) -> Path:
-        path = self._path(attached)
-        path.write_text(attached.text, encoding="utf-8")
-        return path
-
-    def _loaded(self, attached: Attached) -> Any:
-        from chladni.gap.kept_memory import keep_memory
-        from chladni.models.files.model_file import load_model
-        from chladni.robots.loading import is_robot_file, load_robot
-
-        keep_memory()
-        path = self._laid_down(attached)
-        # A robot's description names further files beside it: workers need the same folder.
-        return load_robot(attached.path, meshes=False) if is_robot_file(path) else load_model(path)
-
-
-@lru_cache(maxsize=4)
-def _prepared(recipe: str) -> _Prepared:
-    return _Prepared(Recipe.from_json(recipe))
 
 
 @dataclass(slots=True)
@@ -154,16 +96,16 @@ class _Found:
             return None
 
 
-def _log_rows(prepared: _Prepared, task: Task) -> Rows:
+def _log_rows(ready: Prepared, task: Task) -> Rows:
     began_s, cpu_s = time.perf_counter(), time.process_time()
     found = _Found(LogAddress(url=task.url))
     unchanged = False
-    with _told(prepared, found, "read"), ExitStack() as stack:
+    with _told(ready, found, "read"), ExitStack() as stack:
         log = stack.enter_context(held(found.address))
         found.content, found.size_bytes = log.content, log.size_bytes
         unchanged = log.content == task.known
         if not unchanged:
-            _work(prepared, log, found)
+            _work(ready, log, found, task.sums if log.stamp == task.seen else ())
     effort = {
         "seconds": time.perf_counter() - began_s,
         "cpu_s": time.process_time() - cpu_s,
@@ -172,26 +114,33 @@ def _log_rows(prepared: _Prepared, task: Task) -> Rows:
     }
     rows: Rows = {"effort": [effort]}
     if not unchanged or found.failures:
-        rows |= _all_rows(prepared.recipe, found)
+        rows |= _all_rows(ready.recipe, found)
     return {
         table: [{"log": found.address.told, "day": found.day, **row} for row in made] for table, made in rows.items()
     }
 
 
-def _work(prepared: _Prepared, held_log: HeldLog, found: _Found) -> None:
-    with _told(prepared, found, "open", fetched=held_log), prepared.open(held_log.path) as log:
+def _work(ready: Prepared, held_log: HeldLog, found: _Found, sums: Sequence[bytes]) -> None:
+    with _told(ready, found, "open", fetched=held_log), ready.open(held_log.path) as log:
         found.channels, found.begins_ns = len(log.channels), log.start_time_ns
-        for step in prepared.recipe.steps:
-            with _told(prepared, found, step, fetched=held_log):
-                asked = getattr(prepared.recipe.file, step)
-                found.documents[step] = DOCUMENTS[step](log, asked, prepared.model)
+        for step in ready.recipe.steps:
+            with _told(ready, found, step, fetched=held_log):
+                found.documents[step] = _document(ready, log, step, sums)
         if "info" in found.documents:
             found.duration_s = found.documents["info"]["duration_s"]
         found.damage = len(log.damage)
 
 
+def _document(ready: Prepared, log: Log, step: str, sums: Sequence[bytes]) -> Document:
+    asked = getattr(ready.recipe.file, step)
+    if sums and step in DIVIDED:
+        with suppress(NeedsWholeError):
+            return DOCUMENTS[step](log, asked, ready.model, read_sums(sums, step))
+    return DOCUMENTS[step](log, asked, ready.model)
+
+
 @contextmanager
-def _told(prepared: _Prepared, found: _Found, step: str, *, fetched: HeldLog | None = None) -> Iterator[None]:
+def _told(ready: Prepared, found: _Found, step: str, *, fetched: HeldLog | None = None) -> Iterator[None]:
     """Make a failure of what goes wrong: one step's, and the others go on.
 
     A defect of ours is one, too: among ten thousand logs it's better told than the end of the study.
@@ -205,7 +154,7 @@ def _told(prepared: _Prepared, found: _Found, step: str, *, fetched: HeldLog | N
         kind = _kind(error)
         if kind == "defect":
             reason = f"defect of chladni ({type(error).__name__}): {reason}"
-        found.failures.append({"step": step, "kind": kind, "reason": prepared.told(reason)})
+        found.failures.append({"step": step, "kind": kind, "reason": ready.told(reason)})
 
 
 def _kind(error: Exception) -> str:

@@ -67,11 +67,14 @@ class HeldLog:
         SHA-256 of its bytes, in hexadecimal.
     size_bytes
         Number of its bytes.
+    stamp
+        What tells it from another file of its name: size and time of a file here, SHA-256 of one that was fetched.
     """
 
     path: Path
     content: str
     size_bytes: int
+    stamp: str
 
 
 def is_address(word: str) -> bool:
@@ -193,8 +196,10 @@ def _from_store(url: str, done: str) -> Iterator[None]:
 
 
 @contextmanager
-def held(address: LogAddress) -> Iterator[HeldLog]:
+def held(address: LogAddress, *, hashed: bool = True) -> Iterator[HeldLog]:
     """Lend a log as a file on this disk; what was fetched is removed afterwards.
+
+    A local file is read for its hash, unless that isn't wanted: then its content is an empty text.
 
     Raises
     ------
@@ -209,10 +214,13 @@ def held(address: LogAddress) -> Iterator[HeldLog]:
         return
     path = Path(address.url)
     with open_regular(path, LogError) as file:
-        before = _stamp(os.fstat(file.fileno()))
-        copy = _Copy()
-        copy.run(file)
-    yield HeldLog(path=path, content=copy.digest.hexdigest(), size_bytes=copy.size)
+        status = os.fstat(file.fileno())
+        before, size, content = _stamp(status), status.st_size, ""
+        if hashed:
+            copy = _Copy()
+            copy.run(file)
+            size, content = copy.size, copy.digest.hexdigest()
+    yield HeldLog(path=path, content=content, size_bytes=size, stamp=before)
     if _stamp(path.stat()) != before:
         raise StoreError(f"{address.told}: changed while it was read; run again when its recorder has closed it")
 
@@ -224,7 +232,8 @@ def _fetched(address: LogAddress, folder: Path) -> HeldLog:
     copy = _Copy(target=path)
     with _from_store(address.url, "fetched"):
         copy.run_unless_stalled(lambda: system.open(inside, "rb"))
-    return HeldLog(path=path, content=copy.digest.hexdigest(), size_bytes=copy.size)
+    content = copy.digest.hexdigest()
+    return HeldLog(path=path, content=content, size_bytes=copy.size, stamp=content)
 
 
 @dataclass(slots=True, kw_only=True)

@@ -86,7 +86,7 @@ def open_record(source: Source) -> ResponseRecord:
         raise EstimateError(f"no channel varies ({', '.join(constant)}): there is no response to find modes in")
     return ResponseRecord(
         lead=tuple(block.select(kept) for block in lead) if constant else lead,
-        blocks=(block.select(kept) for block in blocks) if constant else blocks,
+        blocks=(block.select(kept) for block in blocks) if constant else iter(blocks),
         whole=samples_known(source, lead, SAMPLES_TO_PLAN_FROM) is not None,
         constant=constant,
     )
