@@ -143,30 +143,28 @@ class SeverityAccumulator:
     @property
     def margins(self) -> Margins:
         """Of a part: as far as the filter reaches."""
-        return next(iter(self._measured.values())).margins
+        return self._all()[0].margins
 
     def begin(self, own: Own) -> None:
         """See `chladni.spectral.blocks.Accumulator`."""
-        for one in self._measured.values():
+        for one in self._all():
             one.begin(own)
 
     def numbers(self) -> Numbers:
         """See `chladni.spectral.blocks.Accumulator`."""
         return {
-            f"{place}/{name}": found
-            for place, one in enumerate(self._measured.values())
-            for name, found in one.numbers().items()
+            f"{place}/{name}": found for place, one in enumerate(self._all()) for name, found in one.numbers().items()
         }
 
     def add_numbers(self, found: Numbers) -> None:
         """See `chladni.spectral.blocks.Accumulator`."""
-        for place, one in enumerate(self._measured.values()):
+        for place, one in enumerate(self._all()):
             mine = f"{place}/"
             one.add_numbers({name.removeprefix(mine): some for name, some in found.items() if name.startswith(mine)})
 
     def settle(self, runs: Sequence[tuple[int, int]]) -> None:
         """See `chladni.spectral.blocks.Accumulator`."""
-        for one in self._measured.values():
+        for one in self._all():
             one.settle(runs)
 
     def update(self, block: TimeSeries) -> None:
@@ -194,6 +192,9 @@ class SeverityAccumulator:
             running_displacement=_joined(displacement),
             notes=self._notes(),
         )
+
+    def _all(self) -> list[LevelsAccumulator]:
+        return [one for pair in self._measured.values() for one in pair]
 
     def _notes(self) -> tuple[str, ...]:
         if self._nyquist_hz >= self.band_hz[1]:
