@@ -22,7 +22,7 @@ SHORT = 'format = "chladni.study/1"\n[info]\n[psd]\n[levels]\n'
 REAL = 'format = "chladni.study/1"\n[info]\n[psd]\n[levels]\n[modes]\noperational = true\nband_hz = [10, 200]\n'
 
 
-def write_one(path: Path, *, seed: int, seconds: float, channels: int = 3) -> None:
+def write_one(path: Path, *, seed: int, seconds: float, channels: int = 3, layout: str = "batches") -> None:
     """Write a log with a line and noise in each channel."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
@@ -35,7 +35,7 @@ def write_one(path: Path, *, seed: int, seconds: float, channels: int = 3) -> No
         start_time_ns=START_NS + seed * 3600 * 10**9,
         channels=tuple(Channel(name=f"/imu{number}.x", unit="m/s^2") for number in range(channels)),
     )
-    write_mcap(series, path, layout="batches")
+    write_mcap(series, path, layout=layout)
 
 
 def write_logs(folder: Path, count: int, *, seconds: float, distinct: int = 100, channels: int = 3) -> Path:

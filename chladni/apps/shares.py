@@ -63,6 +63,7 @@ class DividedGrid(Watched, Divided):
         Watched.__init__(self, grid.names, (), duration_s=grid.duration_s, progress=no_progress)
         self.log = log
         self.grid = grid
+        self._lead: tuple[TimeSeries, ...] = ()
         self.span = span
 
     def __iter__(self) -> Iterator[TimeSeries]:
@@ -71,7 +72,10 @@ class DividedGrid(Watched, Divided):
 
     def lead(self, samples: int) -> tuple[TimeSeries, ...]:
         """See `Divided`."""
-        return leading_part(self.blocks(None), samples)[0]
+        if sum(block.samples for block in self._lead) < min(samples, self.grid.samples):
+            self._lead = leading_part(self.blocks(None), samples)[0]
+        # It may have been asked for a longer one before.
+        return leading_part(self._lead, samples)[0]
 
     def blocks(self, between: tuple[int, int] | None) -> Iterator[TimeSeries]:
         """Read blocks as they are where nothing is shared, or of some of the samples."""

@@ -494,6 +494,8 @@ def _extents(parts: "Sequence[_Part]", placements: Sequence[Placement]) -> tuple
 
 
 def _among_every(every: Sequence[int], needed: Mask) -> list[bool]:
-    """Say of each piece, the empty ones among them, whether it's needed; `needed` leaves the empty ones out."""
+    """Say of each piece up to the last needed one whether it is; `needed` leaves out the empty ones."""
     flags = iter(needed.tolist())
-    return [bool(size) and next(flags) for size in every]
+    wanted = [bool(size) and next(flags) for size in every]
+    # Nothing is read behind the last one.
+    return wanted[: 1 + max((place for place, one in enumerate(wanted) if one), default=-1)]

@@ -1,8 +1,9 @@
 """A stream: channels of one topic whose samples come in the same messages, and so at the same times."""
 
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import compress, repeat
+from itertools import compress
 from typing import Final
 
 import numpy as np
@@ -365,21 +366,24 @@ class PieceReader:
     ) -> Iterator[tuple[int, Piece]]:
         """Give the number of a stream and what each batch holds of it, in the order of the batches.
 
-        Those that aren't wanted, by their number, are left out; messages of which none is wanted aren't decoded.
+        Those that aren't wanted, by their number, are left out; messages of which none is wanted aren't decoded, and
+        batches behind the last number aren't read.
         """
-        flags = repeat(True) if wanted is None else iter(wanted)
-        for stretch, batch in numbered(batches):
-            yield from self._of_batch(batch, stretch, flags, with_values=with_values)
+        flags = deque(wanted or ())
+        for stretch, batch in numbered(batches) if wanted is None or flags else ():
+            yield from self._of_batch(batch, stretch, None if wanted is None else flags, with_values=with_values)
+            if wanted is not None and not flags:
+                return
 
     def _of_batch(
-        self, batch: MessageBatch, stretch: int, flags: Iterator[bool], *, with_values: bool
+        self, batch: MessageBatch, stretch: int, flags: deque[bool] | None, *, with_values: bool
     ) -> Iterator[tuple[int, Piece]]:
         reader, streams = self._readers[batch.channel_id], self._streams
         for index, why in reader.refused.items():
-            if next(flags):
+            if _next(flags):
                 yield index, streams[index].without(len(batch), why)
         for part in batch.parts(max(1, VALUES_AT_ONCE // max(1, len(reader.leaves)))) if reader.streams else ():
-            wanted = [next(flags) for _ in reader.streams]
+            wanted = [_next(flags) for _ in reader.streams]
             if not any(wanted):
                 continue
             decoded = streams[reader.streams[0]].topic.decode(part, reader.leaves)
@@ -389,6 +393,11 @@ class PieceReader:
                 yield index, counted.once(piece, streams[index])
                 if decoded.reasons or decoded.told:
                     decoded = replace(decoded, reasons={}, told={})
+
+
+def _next(flags: deque[bool] | None) -> bool:
+    """Whether the next piece is wanted: all are without flags, and none behind the last flag."""
+    return flags is None or (bool(flags) and flags.popleft())
 
 
 class _Counted:
