@@ -1,20 +1,48 @@
 """Fixtures shared by all tests."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
+from _pytest.doctest import DoctestModule
 from hypothesis import settings
 
 # Matrices in tests are small. Where several programs run, the waiting threads of BLAS would fight for the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+TESTS = Path(__file__).parent
+
 # How long an example takes depends on what else the machine does; speed is measured in benchmarks/.
 # Few inputs of each property in the gate; beside the nightly tests, `--hypothesis-profile=many`.
-settings.register_profile("chladni", deadline=None, max_examples=25)
+settings.register_profile("chladni", deadline=None, max_examples=12)
 settings.register_profile("many", deadline=None)
 settings.load_profile("chladni")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+    """No test module has examples in its docstrings; looking for them takes a tenth of the collection."""
+    return [one for one in (yield) if not (isinstance(one, DoctestModule) and file_path.is_relative_to(TESTS))]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Each worker begins elsewhere in a folder, and finds compiled what another one met before it."""
+    report = yield
+    worker = getattr(collector.config, "workerinput", None)
+    if worker and isinstance(collector, pytest.Dir) and report.passed:
+        first = len(report.result) * int(worker["workerid"].removeprefix("gw")) // worker["workercount"]
+        report.result = [*report.result[first:], *report.result[:first]]
+    return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Workers agree on one order, whichever they collected in."""
+    items.sort(key=lambda item: item.path.parts)
 
 
 @pytest.fixture(scope="session", autouse=True)

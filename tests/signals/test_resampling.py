@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import resample_poly
@@ -135,7 +135,6 @@ def test_single_precision_is_kept() -> None:
     assert resample(source, sample_rate_hz=700.0).series.values.dtype == np.float32
 
 
-@settings(deadline=None, max_examples=25)
 @given(
     old_hz=st.floats(10.0, 5000.0),
     ratio=st.floats(0.2, 5.0),

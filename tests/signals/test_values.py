@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.io.clock.time_base import TimeBase, fit_time_base
@@ -287,7 +287,6 @@ def test_geometry() -> None:
         Geometry(points=points, lines=(("base", "leg"),))
 
 
-@settings(deadline=None, max_examples=20)
 @given(ours.geometries())
 def test_a_drawn_geometry_finds_its_points(geometry: Geometry) -> None:
     for point in geometry.points:

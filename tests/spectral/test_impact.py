@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.signals.channel import Channel
@@ -57,7 +57,6 @@ def numbers(rejected):
     return [rejection.record for rejection in rejected]
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     noise=st.sampled_from([0.0, 1e-4, 1e-3, 3e-3]),
     scale=st.sampled_from([1e-3, 1.0, 5e3]),

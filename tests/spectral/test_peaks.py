@@ -48,8 +48,9 @@ def noise(kind, random, samples):
 
 
 @pytest.mark.parametrize("kind", ["white", "band", "falling"])
-@pytest.mark.parametrize(("samples", "resolution_hz"), [(4000, 0.5), (4000, 1.0), (20_000, 1.0)])
-@pytest.mark.parametrize("window", ["hann", "boxcar"])
+@pytest.mark.parametrize(
+    ("samples", "resolution_hz", "window"), [(4000, 0.5, "hann"), (4000, 1.0, "boxcar"), (20_000, 1.0, "hann")]
+)
 def test_peakless_noise_gives_no_peak(kind, samples, resolution_hz, window):
     random = np.random.default_rng(11)
     channels = 40

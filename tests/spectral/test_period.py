@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import chirp, lfilter
 
@@ -22,7 +22,6 @@ def found(values, **options):
     return find_period(series(values), channel="a", **options)
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     samples=st.integers(200, 700),
     periods=st.floats(3, 9),

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.signals.errors import EstimateError
@@ -54,7 +54,6 @@ def test_the_account_tells_of_periods():
     assert account.notes == ("a repeats every 0.25 s: 7 whole periods averaged without window",)
 
 
-@settings(max_examples=25, deadline=None)
 @given(lengths=st.lists(st.integers(1, 700), max_size=10), first=st.integers(0, 300))
 def test_any_cut_into_blocks_gives_the_same_periods(lengths, first):
     period = replace(PERIOD, first_sample=first)

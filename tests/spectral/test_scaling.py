@@ -76,7 +76,7 @@ EACH = pytest.mark.parametrize("name", ESTIMATES)
 
 
 @EACH
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(exponent=st.integers(-190, 190))
 def test_estimates_scale_with_a_power_of_two(name, exponent):
     signal, estimate, power = ESTIMATES[name]
@@ -87,21 +87,21 @@ def test_estimates_scale_with_a_power_of_two(name, exponent):
 
 
 @EACH
-@pytest.mark.parametrize("exponent", [-1073, -1022, -700, -530, -350, -210, 210, 350, 510, 700, 1018])
-def test_what_cannot_be_squared_is_refused_with_channel_size_and_remedy(name, exponent):
+def test_what_cannot_be_squared_is_refused_with_channel_size_and_remedy(name):
     signal, estimate, _ = ESTIMATES[name]
-    with pytest.raises(EstimateError, match=r"'force' holds .*e[+-]\d+.*; leave the channel out, or scale it"):
-        estimate(scaled(signal, exponent))
+    for exponent in (-1073, -1022, -700, -530, -350, -210, 210, 350, 510, 700, 1018):
+        with pytest.raises(EstimateError, match=r"'force' holds .*e[+-]\d+.*; leave the channel out, or scale it"):
+            estimate(scaled(signal, exponent))
 
 
 @EACH
-@pytest.mark.parametrize("exponent", [-1000, -300, 300, 1000])
-def test_one_channel_out_of_range_is_the_one_that_is_named(name, exponent):
+def test_one_channel_out_of_range_is_the_one_that_is_named(name):
     signal, estimate, _ = ESTIMATES[name]
-    values = signal.values.copy()
-    values[1] = np.ldexp(values[1], exponent)
-    with pytest.raises(EstimateError, match="channel 'acc' holds"):
-        estimate(replace(signal, values=values))
+    for exponent in (-1000, -300, 300, 1000):
+        values = signal.values.copy()
+        values[1] = np.ldexp(values[1], exponent)
+        with pytest.raises(EstimateError, match="channel 'acc' holds"):
+            estimate(replace(signal, values=values))
 
 
 @EACH

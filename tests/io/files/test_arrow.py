@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pyarrow import feather, ipc, parquet
 
@@ -32,7 +32,6 @@ def series_of(samples: int = 20, **fields: object) -> TimeSeries:
     return TimeSeries(**(options | {"channels": CHANNELS} | fields))
 
 
-@settings(max_examples=20, deadline=None)
 @given(
     suffix=st.sampled_from(SUFFIXES),
     samples=st.integers(1, 30),

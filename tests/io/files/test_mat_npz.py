@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import loadmat, savemat
 
@@ -47,7 +47,6 @@ def save(path: Path, **arrays: object) -> Path:
     return path
 
 
-@settings(max_examples=20, deadline=None)
 @given(
     kind=st.sampled_from(list(KINDS)),
     shape=st.tuples(st.integers(1, 3), st.integers(1, 5)),

@@ -247,8 +247,7 @@ def in_columns(rows: NDArray, widths: list[int]) -> bytes:
 
 @pytest.mark.parametrize("form", [2, 4, 5, 6])
 @pytest.mark.parametrize("even", [True, False])
-@pytest.mark.parametrize("count", [59, 60, 61])
-@pytest.mark.parametrize("newline", [b"\n", b"\r\n", b"   \n"])
+@pytest.mark.parametrize(("count", "newline"), [(60, b"\n"), (60, b"\r\n"), (60, b"   \n"), (59, b"\n"), (61, b"\n")])
 def test_a_piece_that_is_missing_in_a_line_of_columns_is_told(
     form: int, even: bool, count: int, newline: bytes
 ) -> None:
@@ -259,7 +258,7 @@ def test_a_piece_that_is_missing_in_a_line_of_columns_is_told(
     sound = text_values(body, layout)
     assert sound.notes == ()
     wrong = 0
-    for place in range(0, len(body) - 10, 7):
+    for place in range(0, len(body) - 10, 17):
         for size in (1, 4, 9):
             try:
                 read = text_values(body[:place] + body[place + size :], layout)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -274,7 +274,6 @@ def test_an_existing_log_is_kept_unless_told(tmp_path: Path) -> None:
     assert (tmp_path / "a.mcap").read_bytes() == b"precious"
 
 
-@settings(max_examples=25, deadline=None)
 @given(data=st.data())
 def test_any_gaps_survive(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     samples = data.draw(st.integers(1, 40))

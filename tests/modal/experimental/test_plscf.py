@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.modal.experimental.plscf import polyreference_poles
@@ -269,7 +269,6 @@ def test_lines_that_do_not_determine_the_polynomials_are_an_error(monkeypatch):
         polyreference_poles(_a_hole(functions(chain(), FREQUENCY_HZ)))
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     lines=st.integers(10, 120),

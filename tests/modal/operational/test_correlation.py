@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.modal.operational.anti_alias import power_transfer
@@ -63,7 +63,6 @@ def test_white_noise_correlates_at_lag_0_only_and_each_function_scatters_as_its_
     np.testing.assert_allclose(np.median(std[1:]), 1 / np.sqrt(40_000), rtol=0.05)
 
 
-@settings(max_examples=25)
 @given(cuts=st.lists(st.integers(1, 2999), max_size=6))
 def test_a_stream_gives_what_the_whole_gives(cuts):
     values = coloured(3000)
