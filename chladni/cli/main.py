@@ -5,10 +5,12 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import cache
 from signal import Signals
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.main import get_command
 
 from chladni import __version__
 from chladni.apps.stopping import LISTENER, Stopped
@@ -104,6 +106,12 @@ def _options(
     pass
 
 
+@cache
+def _program() -> Any:
+    # Half of the time of a short command goes into this; within a process it's made once.
+    return get_command(app)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit code.
 
@@ -112,7 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     environment the traceback follows.
     """
     try:
-        code = app(args=arguments, prog_name="chladni", standalone_mode=False)
+        code = _program()(args=arguments, prog_name="chladni", standalone_mode=False)
     except (ChladniError, typer.TyperException) as error:
         return _fail(error, UNUSABLE)
     except Stopped as stopped:

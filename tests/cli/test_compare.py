@@ -1,3 +1,4 @@
+import json
 from types import SimpleNamespace
 
 import pytest
@@ -65,11 +66,11 @@ def test_modes_of_both_are_compared_when_asked_for(run, arm_log, tmp_path):
 
     # A sensor's gain changes one component of every shape, but no frequency and no damping.
     louder = write_arm(tmp_path, gain=1.2)
-    document = run("compare", arm_log, louder, "--modes", "--json", "-").document
+    outcome = run("compare", arm_log, louder, "--modes", "--json", tmp_path / "compared.json")
+    document = json.loads((tmp_path / "compared.json").read_text())
     assert [one["fate"] for one in document["modes"]] == ["unchanged"] * 5
     assert all(one["mac"] < 1 for one in document["modes"])
     assert all(one["shift_std_hz"] > 0 for one in document["modes"])
-    outcome = run("compare", arm_log, louder, "--modes")
     assert "change of damping ratio" in outcome.out
     assert run("compare", arm_log, louder, "--json", "-").document["modes"] is None
 

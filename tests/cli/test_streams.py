@@ -212,7 +212,7 @@ def test_a_library_that_makes_an_error_of_a_signal_is_no_defect(
         monkeypatch.setattr(LISTENER, "heard", int(signal.SIGTERM))
         raise ValueError("something went wrong")
 
-    monkeypatch.setattr("chladni.cli.main.app", swallow)
+    monkeypatch.setattr("chladni.cli.main._program", lambda: swallow)
     assert main(["info"]) == 128 + signal.SIGTERM
     assert capsys.readouterr().err == "chladni: ended by SIGTERM; every file is whole, or as it was before\n"
 
@@ -223,6 +223,6 @@ def test_what_the_system_refuses_is_no_defect(
     def refuse(*_: object, **__: object) -> None:
         raise OSError(24, "Too many open files", "some.file")
 
-    monkeypatch.setattr("chladni.cli.main.app", refuse)
+    monkeypatch.setattr("chladni.cli.main._program", lambda: refuse)
     assert main(["info"]) == UNUSABLE
     assert capsys.readouterr().err == "chladni: some.file: the operating system refuses: Too many open files\n"

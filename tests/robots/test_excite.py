@@ -66,7 +66,9 @@ def test_velocity_and_acceleration_are_the_derivatives() -> None:
     np.testing.assert_allclose(series.basis(time_s)[1:], slope[:2], atol=1e-8)
 
 
-@pytest.mark.parametrize(("effort", "base_hz"), [(60.0, 0.1), (60.0, 0.6), (12.0, 0.6)])
+@pytest.mark.parametrize(
+    ("effort", "base_hz"), [(60.0, 0.1), pytest.param(60.0, 0.6, marks=pytest.mark.nightly), (12.0, 0.6)]
+)
 def test_limits_hold_between_the_samples_of_every_grid(tmp_path: Path, effort: float, base_hz: float) -> None:
     robot = planar(tmp_path, effort)
     pose = {"shoulder": 1.6, "elbow": 0.1}

@@ -15,23 +15,23 @@ from chladni.models.effects.catalogue import CATALOGUE
 from tests.gap.arm import arm, measured
 
 
-def judged(effect: AttachedEffect, *, words: set[str]) -> tuple[Study, Causes]:
+def judged(effect: AttachedEffect, *, words: set[str], seconds: float = 5.0) -> tuple[Study, Causes]:
     """What is said where these words take part alone."""
-    log = measured((effect,), seed=7, seconds=5.0)
+    log = measured((effect,), seed=7, seconds=seconds)
     study = study_of(arm(), log, leave_out=frozenset(CATALOGUE) - words, own={})
     return causes_found(study, lambda _: None)
 
 
-def beside(effect: AttachedEffect, *, words: set[str]) -> tuple[str, AnyLaw | None]:
+def beside(effect: AttachedEffect, *, words: set[str], seconds: float = 5.0) -> tuple[str, AnyLaw | None]:
     """Verdict, and what any law explains."""
-    study, causes = judged(effect, words=words)
+    study, causes = judged(effect, words=words, seconds=seconds)
     return causes.verdict, any_law(study, causes, causes_named(study, causes))
 
 
 @pytest.mark.slow
 def test_a_law_that_took_no_part_is_seen_to_follow_the_motion() -> None:
     spring = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})
-    verdict, law = beside(spring, words={"gain_error", "delay"})
+    verdict, law = beside(spring, words={"gain_error", "delay"}, seconds=3.0)
     assert verdict == "unknown"
     assert law is not None
     assert law.site == "hand" or "hand" in law.group

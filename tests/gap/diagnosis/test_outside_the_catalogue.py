@@ -70,7 +70,7 @@ def test_a_loop_is_believed_where_there_is_one() -> None:
     assert [(one.effect, one.site) for one in found.causes] == [("hysteresis", "elbow")]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_equal_mounts_on_all_sensors_are_no_causes_where_one_filter_of_the_command_does_as_much() -> None:
     log = measured((chladni.attached("lag", "shaker", {"time_constant": 5e-4}),), seed=5, seconds=5.0)
     found = diagnose(arm(), [log], leave_out=frozenset(CATALOGUE) - {"mounting_resonance", "gain_error"})

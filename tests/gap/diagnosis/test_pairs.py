@@ -53,7 +53,13 @@ def two_sensors(*effects: AttachedEffect, words: frozenset[str]):
     return study_of(machine, log, leave_out=frozenset(CATALOGUE) - words, own={})
 
 
-@pytest.mark.parametrize("first", [("coulomb_friction", {"force": 10.0}), ("hardening_stiffness", {"cubic": 2e9})])
+@pytest.mark.parametrize(
+    "first",
+    [
+        ("coulomb_friction", {"force": 10.0}),
+        pytest.param(("hardening_stiffness", {"cubic": 2e9}), marks=pytest.mark.nightly),
+    ],
+)
 def test_of_two_sensors_laws_tell_where_two_effects_are(first) -> None:
     effects = chladni.attached(first[0], "j0", first[1]), chladni.attached("coulomb_friction", "j1", {"force": 6.0})
     study = two_sensors(*effects, words=frozenset({"coulomb_friction", "hardening_stiffness", "gain_error"}))
@@ -87,6 +93,7 @@ def test_one_sensor_is_explained_by_any_force() -> None:
     assert pairs._weighed_pairs(study, Search(study).nothing, located_pairs(study.location)) == []
 
 
+@pytest.mark.nightly
 def test_two_forces_are_told_where_they_explain_much_more_than_one() -> None:
     def location(*effects: AttachedEffect) -> Location:
         log = measured(effects, seconds=3.0, seed=4)

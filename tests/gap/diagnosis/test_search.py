@@ -17,7 +17,7 @@ from tests.gap.made_log import band_noise, chain
 from tests.gap.made_log import measured as made
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_stribeck_curve_that_falls_slowly_isnt_lost_to_coulombs() -> None:
     # It falls over four times the speed that is usual there: from a curve that falls at once the search ends at
     # Coulomb's friction, with static and sliding force alike.
@@ -66,7 +66,7 @@ def test_a_ripple_of_the_joint_that_an_input_acts_across_may_be_the_inputs() -> 
     assert best.fit.effects[0].values["phase"] == pytest.approx(0.3 - 3.141592653589793, abs=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_details_of_a_first_effect_dont_cost_the_second_its_name() -> None:
     mount = {"frequency": 120.0, "damping_ratio": 0.1, "carried": 0.6}
     soft, load = attached("mounting_resonance", "acc_wrist", mount), attached("added_mass", "column", {"mass": 2.0})
@@ -87,7 +87,8 @@ def test_details_of_a_first_effect_dont_cost_the_second_its_name() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("gain", [1.015, pytest.param(1.4, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("gain", [1.015, 1.4])
 def test_a_second_cause_is_named_where_it_is_a_share_of_the_gap_that_a_model_is_not_rounded_by(gain: float) -> None:
     machine = chain([2.0, 2.5], [2.6e4, 1.7e4], [5.0, 4.0])
     spring = chladni.attached("hardening_stiffness", "j0", {"cubic": 3e9})

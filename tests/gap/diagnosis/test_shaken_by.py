@@ -57,7 +57,7 @@ def test_where_a_force_on_another_body_does_as_well_no_floor_is_told(shaken) -> 
     assert shaken_by(replace(study, location=location), tuned) is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_spring_between_a_body_and_the_ground_is_no_floor() -> None:
     study, tuned = studied(SPRING)
     assert "ground" in study.location.ranked[0].places[0].names

@@ -103,9 +103,9 @@ def test_twenty_machines_of_each_kind(hold, kind, noise):
 @pytest.mark.parametrize(
     "effect",
     [
-        ("added_mass", "b1", {"mass": 0.8}),
+        pytest.param(("added_mass", "b1", {"mass": 0.8}), marks=pytest.mark.nightly),
         ("hardening_stiffness", "j1", {"cubic": 3e12}),
-        ("coulomb_friction", "j1", {"force": 20.0}),
+        pytest.param(("coulomb_friction", "j1", {"force": 20.0}), marks=pytest.mark.nightly),
         # Not by half a sample, which another hold does as well.
         ("delay", "hammer", {"delay": 3.0 / RATE_HZ}),
     ],
@@ -123,6 +123,7 @@ def test_a_hold_that_the_model_states_is_not_asked_about():
     assert told(stated, log, tunables) == "foh"
 
 
+@pytest.mark.nightly
 def test_a_smooth_log_of_a_machine_with_nothing_missing(shared_data: Path):
     folder = shared_data / "diagnosis" / "p2_none_smooth_1pct"
     if not folder.is_dir():

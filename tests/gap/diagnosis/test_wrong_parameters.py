@@ -30,7 +30,7 @@ def diagnosed(*effects: AttachedEffect) -> Diagnosis:
     return diagnose(chain([2.0], [2e5], [TOLD]), [log])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_alone_it_is_named() -> None:
     found = diagnosed()
     assert found.verdict == "parameters"

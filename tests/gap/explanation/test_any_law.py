@@ -18,8 +18,8 @@ from tests.gap.arm import arm, measured
 
 LAWS = [
     ("coulomb_friction", {"force": 4.0, "creep_speed": 2e-4}),
-    ("hardening_stiffness", {"cubic": 4e12}),
-    ("ripple", {"amplitude": 6.0, "period": 2e-5, "phase": 0.4}),
+    pytest.param("hardening_stiffness", {"cubic": 4e12}, marks=pytest.mark.nightly),
+    pytest.param("ripple", {"amplitude": 6.0, "period": 2e-5, "phase": 0.4}, marks=pytest.mark.nightly),
 ]
 
 
@@ -78,13 +78,16 @@ def test_a_stiffness_that_turns_with_a_shaft_is_followed() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("word", "values"), [("lag", {"time_constant": 1e-3}), ("rate_limit", {"rate": 2e4})])
+@pytest.mark.parametrize(
+    ("word", "values"),
+    [("lag", {"time_constant": 1e-3}), pytest.param("rate_limit", {"rate": 2e4}, marks=pytest.mark.nightly)],
+)
 def test_what_an_actuator_does_with_the_command_is_followed(word: str, values: dict[str, float]) -> None:
     assert left_at(chladni.attached(word, "shaker", values), "shaker") < 0.12
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["shoulder", "ground"])
+@pytest.mark.parametrize("name", ["shoulder", pytest.param("ground", marks=pytest.mark.nightly)])
 def test_a_floor_that_shakes_follows_nothing(name: str) -> None:
     floor = chladni.attached("base_vibration", "ground", {"level": 1.0, "band": 150.0, "band_start": 5.0})
     assert left_at(floor, name) > 0.3

@@ -64,7 +64,7 @@ def test_over_windows_it_is_what_the_linear_model_answers_to_the_law_s_force(mad
     assert np.std((way - parts.displacement[key])[middle]) < 0.1 * np.std(way)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_sensor_s_mount_is_found_behind_a_spring(made) -> None:
     log, floor, contest, first = made
     known = KnownEffect.of(contest.run, first.fit, first.fit.effects)

@@ -29,7 +29,7 @@ def found_wrong(tunables, z) -> dict[str, float]:
 @pytest.mark.parametrize(
     ("name", "factor"),
     [
-        ("j1.stiffness", 10.0),
+        pytest.param("j1.stiffness", 10.0, marks=pytest.mark.nightly),
         pytest.param("j1.stiffness", 0.1, marks=pytest.mark.nightly),
         pytest.param("j0.stiffness", 3.0, marks=pytest.mark.nightly),
         pytest.param("j2.damping", 10.0, marks=pytest.mark.nightly),

@@ -53,7 +53,7 @@ def test_sharp_peaks_between_few_lines(method):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise", [0.003, 0.03])
+@pytest.mark.parametrize("noise", [0.003, pytest.param(0.03, marks=pytest.mark.nightly)])
 def test_error_bars_cover_the_truth(method, noise):
     """Two modes, two references; 95 % intervals of 60 runs cover 90 % at least.
 

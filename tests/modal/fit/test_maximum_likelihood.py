@@ -262,7 +262,7 @@ def test_steps_that_run_out_are_told_and_widen_the_intervals():
     assert np.all(refine(response, start, max_iterations=0).frequency_std_hz > short.frequency_std_hz)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_leakage_biases_nothing():
     # Five decay times a segment: a fit without the window finds 7 % too much damping.
     truth = chain()

@@ -29,7 +29,7 @@ def ambient(seed, *, truth=TWO_MODES, cycles=6000):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("damping", [0.01, 0.003])
-@pytest.mark.parametrize("cycles", [300, 1500])
+@pytest.mark.parametrize("cycles", [300, pytest.param(1500, marks=pytest.mark.nightly)])
 def test_modes_driven_by_noise_are_no_harmonics(damping, cycles):
     truth = chain(damping=damping)
     flagged = sum(bool(machine_harmonics(ambient(seed, truth=truth, cycles=cycles))) for seed in range(8))

@@ -83,7 +83,9 @@ def test_error_bars_come_near_what_any_estimator_can_reach():
     assert np.all((relative > 0.95) & (relative < 1.6))
 
 
-@pytest.mark.parametrize("half_width", [0.1, 0.5, 3.0, 20.0])
+@pytest.mark.parametrize(
+    "half_width", [0.1, 3.0, *(pytest.param(one, marks=pytest.mark.nightly) for one in (0.5, 20.0))]
+)
 def test_the_half_power_width_is_freed_of_the_window(half_width):
     # A dense look at one bell: offsets of the mode move the lines over it.
     shifts = np.arange(0.0, 1.0, 1 / 16)

@@ -69,7 +69,7 @@ def test_the_diagram_holds_all_poles_and_says_which_were_taken(modes):
     assert diagram.indicator_unit == "(m/s^2)^2/Hz"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_intervals_cover_as_they_say():
     runs, hits, asked = 8, np.zeros(3, int), np.zeros(3, int)
     for run in range(runs):
@@ -180,7 +180,7 @@ def test_a_count_keeps_the_strongest_and_says_what_is_missing():
     )
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2))])
 def test_a_count_changes_none_of_the_modes_that_it_keeps(seed):
     record = chain_record(seed, cycles=600)
     whole, few = identify(record), identify(record, count=2)

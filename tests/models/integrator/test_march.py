@@ -61,7 +61,10 @@ def test_order_of_each_scheme_by_regression(name, scheme, order):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize(
+    "name",
+    ["smooth hysteresis", *(pytest.param(one, marks=pytest.mark.nightly) for one in ("cubic", "gentle friction"))],
+)
 def test_smooth_laws_agree_with_scipy_over_fifty_cycles(name):
     compiled = one_body(SMOOTH[name])
     signals = two_tones(200, 20.0)
@@ -72,7 +75,14 @@ def test_smooth_laws_agree_with_scipy_over_fifty_cycles(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["stribeck", "backlash", "bouc-wen", "quadratic damping", "stop"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "backlash",
+        "bouc-wen",
+        *(pytest.param(one, marks=pytest.mark.nightly) for one in ("stribeck", "quadratic damping", "stop")),
+    ],
+)
 def test_switching_laws_agree_with_radau_over_ten_cycles(name):
     compiled = one_body(SWITCHING[name])
     signals = two_tones(60, 30.0)
