@@ -77,7 +77,7 @@ def _draw(axes: Axes, trend: Trend) -> None:
         color=VALUES,
         ecolor=(*VALUES, 0.35),
     )
-    axes.plot(x, trend.expected - trend.explained, color="black", linewidth=0.9)
+    axes.plot(x, trend.expected - trend.explained, color="black", linewidth=0.9, drawstyle="steps-mid")
     for change in trend.changes:
         axes.axvspan(x[max(change.first - 1, 0)], x[change.last], color=CHANGED, alpha=0.25, linewidth=0)
         axes.axvline(x[change.place], color=CHANGED, linewidth=0.8)

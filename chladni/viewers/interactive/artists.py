@@ -30,6 +30,7 @@ class UntranslatableError(Exception):
 # Pixels of a line's width or a mark's size for each point on paper.
 PIXELS_A_POINT = 1.5
 MOST_SEGMENTS = 2000
+MS_A_DAY = 86_400_000.0
 # Share of the width that a name above the frame takes, beside another plot in a window of 1280 pixels.
 NAME_SHARE = 0.085
 _MARKS = {
@@ -56,6 +57,8 @@ class Target:
         Of the axes, for reading out.
     cells
         Most cells of an image.
+    dates
+        Whether the x axis is one of dates.
     items, columns
         Of the legend; and by the identity of a line its source and column, where several share one.
     """
@@ -66,6 +69,7 @@ class Target:
     x_name: str
     y_name: str
     cells: int
+    dates: bool = False
     items: list[LegendItem] = field(default_factory=list)
     columns: dict[int, tuple[ColumnDataSource, str]] = field(default_factory=dict)
 
@@ -76,6 +80,16 @@ class Target:
             return values
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.decade_db * np.log10(values))
+
+    def along(self, x: ArrayLike) -> Real:
+        """Give values of the x axis as they are drawn: of dates, milliseconds where matplotlib has days."""
+        return np.ma.filled(np.ma.asarray(x, dtype=np.float64), np.nan) * (MS_A_DAY if self.dates else 1.0)
+
+    def told_x(self, column: str, digits: str) -> tuple[str, dict[str, Any]]:
+        """Give how a box tells x, and the kind of formatter that this takes."""
+        key = column if column.startswith("$") else f"@{column}"
+        told = "{%F %H:%M}" if self.dates else f"{{%.{digits}}}"
+        return f"{key}{told}", {key: "datetime" if self.dates else "printf"}
 
     def name(self, renderer: Any, artist: Artist, colour: str) -> None:
         """Add a renderer to the legend where its artist has a word; all of one colour hide together."""
@@ -133,20 +147,21 @@ def _draw_read_out(axes: Axes, target: Target) -> None:
     groups: dict[bytes, list[Line2D]] = {}
     for line in axes.lines:
         if _places(axes, line) == (True, True) and line.get_linestyle() != "None":
-            groups.setdefault(np.asarray(line.get_xdata(), dtype=np.float64).tobytes(), []).append(line)
+            groups.setdefault(target.along(line.get_xdata(orig=False)).tobytes(), []).append(line)
     for lines in groups.values():
         columns = {f"y{place}": packed(target.up(line.get_ydata())) for place, line in enumerate(lines)}
-        source = ColumnDataSource({"x": packed(lines[0].get_xdata()), **columns})
+        source = ColumnDataSource({"x": packed(target.along(lines[0].get_xdata(orig=False))), **columns})
         for place, line in enumerate(lines):
             target.columns[id(line)] = (source, f"y{place}")
         unseen = target.plot.line("x", "y0", source=source, line_alpha=0.0, y_range_name=target.range_name)
         told = [(_word(line) or target.y_name, f"@y{place}{{%.5g}}") for place, line in enumerate(lines)]
+        told_x, formatters = target.told_x("x", "7g")
         target.plot.add_tools(
             HoverTool(
                 renderers=[unseen],
                 mode="mouse" if axes.get_aspect() == 1 else "vline",
-                tooltips=[(target.x_name, "@x{%.7g}"), *told],
-                formatters=dict.fromkeys(["@x", *(f"@{name}" for name in columns)], "printf"),
+                tooltips=[(target.x_name, told_x), *told],
+                formatters=formatters | dict.fromkeys((f"@{name}" for name in columns), "printf"),
             )
         )
 
@@ -168,7 +183,7 @@ def _draw_line(axes: Axes, target: Target, line: Line2D) -> None:
     if (across, up) != (True, True):
         if across == up:
             raise UntranslatableError("a line over the frame")
-        value = float(np.asarray(line.get_xdata() if across else target.up(line.get_ydata()))[0])
+        value = float((target.along(line.get_xdata(orig=False)) if across else target.up(line.get_ydata()))[0])
         target.plot.add_layout(
             Span(location=value, dimension="height" if across else "width", y_range_name=target.range_name, **look)
         )
@@ -178,7 +193,8 @@ def _draw_line(axes: Axes, target: Target, line: Line2D) -> None:
         target.name(_stroke(target, line, source, place, look), line, colour)
     else:
         place = "y"
-        source = ColumnDataSource({"x": packed(line.get_xdata()), place: packed(target.up(line.get_ydata()))})
+        x = packed(target.along(line.get_xdata(orig=False)))
+        source = ColumnDataSource({"x": x, place: packed(target.up(line.get_ydata()))})
     if line.get_marker() not in (None, "None", "", " "):
         renderer = _marks(target, line, source, place)
         if line.get_linestyle() == "None":
@@ -217,17 +233,18 @@ def _marks(target: Target, line: Line2D, source: ColumnDataSource, place: str) -
 
 
 def _read_points(target: Target, renderer: Any, x: str, y: str) -> None:
+    told_x, formatters = target.told_x(x, "7g")
     target.plot.add_tools(
         HoverTool(
             renderers=[renderer],
-            tooltips=[(target.x_name, f"@{x}{{%.7g}}"), (target.y_name, f"@{y}{{%.5g}}")],
-            formatters={f"@{x}": "printf", f"@{y}": "printf"},
+            tooltips=[(target.x_name, told_x), (target.y_name, f"@{y}{{%.5g}}")],
+            formatters={**formatters, f"@{y}": "printf"},
         )
     )
 
 
 def _draw_image(axes: Axes, target: Target, image: AxesImage) -> None:
-    if image.norm.vmin is None or image.norm.vmax is None or axes.get_aspect() != "auto":
+    if target.dates or image.norm.vmin is None or image.norm.vmax is None or axes.get_aspect() != "auto":
         raise UntranslatableError("an image without a scale")
     level = np.ma.filled(np.ma.asarray(image.get_array(), dtype=np.float64), np.nan)
     if level.ndim != 2:
@@ -285,7 +302,7 @@ def _draw_segments(axes: Axes, target: Target, lines: LineCollection) -> None:
         return
     colours = [_hex(one) for one in _several(lines.get_color())] or ["#000000"]
     target.plot.multi_line(
-        [packed(one[:, 0]) for one in segments],
+        [packed(target.along(one[:, 0])) for one in segments],
         [packed(target.up(one[:, 1])) for one in segments],
         line_color=colours[0] if len(colours) == 1 else (colours * len(segments))[: len(segments)],
         line_width=max(float(np.max(lines.get_linewidth())) * PIXELS_A_POINT, 0.6),
@@ -299,7 +316,7 @@ def _draw_points(axes: Axes, target: Target, points: PathCollection) -> None:
     places = np.ma.filled(np.ma.asarray(points.get_offsets(), dtype=np.float64), np.nan)
     colours = [_hex(one) for one in _several(points.get_facecolor())] or ["#000000"]
     one_colour = len(set(colours)) == 1
-    columns: dict[str, Any] = {"x": packed(places[:, 0]), "y": packed(target.up(places[:, 1]))}
+    columns: dict[str, Any] = {"x": packed(target.along(places[:, 0])), "y": packed(target.up(places[:, 1]))}
     if not one_colour:
         columns["colour"] = colours
     renderer = target.plot.scatter(
@@ -326,7 +343,7 @@ def _draw_area(axes: Axes, target: Target, area: PolyCollection) -> None:
         raise UntranslatableError("areas of several colours")
     corners = [np.asarray(path.vertices) for path in paths]
     renderer = target.plot.patches(
-        [packed(one[:, 0]) for one in corners],
+        [packed(target.along(one[:, 0])) for one in corners],
         [packed(target.up(one[:, 1])) for one in corners],
         fill_color=to_hex(face),
         fill_alpha=face[3],
@@ -339,6 +356,8 @@ def _draw_area(axes: Axes, target: Target, area: PolyCollection) -> None:
 def _draw_rectangle(axes: Axes, target: Target, one: Rectangle) -> None:
     across, up = _places(axes, one)
     left, right = sorted((one.get_x(), one.get_x() + one.get_width()))
+    if across:
+        left, right = target.along([left, right]).tolist()
     bottom, top = np.sort(target.up([one.get_y(), one.get_y() + one.get_height()])).tolist()
     face = _rgba(one.get_facecolor())
     if not (across and up):
@@ -356,7 +375,7 @@ def _draw_span(axes: Axes, target: Target, one: Polygon) -> None:
     if across == up:
         raise UntranslatableError("a polygon")
     ends = np.asarray(one.get_xy(), dtype=np.float64)[:, 0 if across else 1]
-    ends = ends if across else target.up(ends)
+    ends = target.along(ends) if across else target.up(ends)
     span = (float(ends.min()), float(ends.max()))
     _add_box(target, one, span if across else None, None if across else span)
 
@@ -414,7 +433,7 @@ def _draw_text(axes: Axes, target: Target, text: Text, names: list[float]) -> No
     # Inside the top of the frame, where it stands above it on paper.
     baseline = text.get_verticalalignment() if up else ("middle" if upright else "top")
     look |= {
-        "x": place_x,
+        "x": float(target.along([place_x])[0]),
         "y": float(target.up([y])[0]) if up else top,
         "text_align": aside,
         "text_baseline": _BASELINES.get(baseline, baseline),

@@ -21,11 +21,19 @@ from bokeh.models import (
 from bokeh.models.annotations import ColorBar, Legend
 from bokeh.plotting import figure as bokeh_figure
 from matplotlib.axes import Axes
+from matplotlib.dates import AutoDateFormatter, ConciseDateFormatter, DateFormatter
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedFormatter
 
 from chladni.viewers.figures.log_axis import DecibelFormatter
-from chladni.viewers.interactive.artists import Target, UntranslatableError, bar_name, draw_artists, mapper_of
+from chladni.viewers.interactive.artists import (
+    MS_A_DAY,
+    Target,
+    UntranslatableError,
+    bar_name,
+    draw_artists,
+    mapper_of,
+)
 from chladni.viewers.interactive.inert import inert
 from chladni.viewers.screen_colours import FAINT, INK, SOFT
 
@@ -126,7 +134,7 @@ def _plot(
     numbered = bool(axes.xaxis.get_tick_params().get("labelbottom", True))
     title = _title(figure, axes)
     plot: Any = bokeh_figure(
-        x_axis_type=_scale(axes.get_xscale()),
+        x_axis_type="datetime" if _has_dates(axes) else _scale(axes.get_xscale()),
         y_axis_type=_y_type(axes),
         tools="box_zoom,xbox_zoom,pan,xwheel_zoom,wheel_zoom,reset,save,crosshair",
         active_drag="box_zoom",
@@ -170,10 +178,15 @@ def _target(plot: Any, axes: Axes, first: Axes, *, cells: int) -> Target:
         plot=plot,
         range_name="right" if right else "default",
         decade_db=formatter.decade_db if isinstance(formatter, DecibelFormatter) else None,
-        x_name=_x_name(axes) or "x",
+        x_name=_x_name(axes) or ("date" if _has_dates(axes) else "x"),
         y_name=inert(axes.get_ylabel() or _supported(axes)) or "y",
         cells=cells,
+        dates=_has_dates(axes),
     )
+
+
+def _has_dates(axes: Axes) -> bool:
+    return isinstance(axes.xaxis.get_major_formatter(), AutoDateFormatter | ConciseDateFormatter | DateFormatter)
 
 
 def _supported(axes: Axes) -> str:
@@ -243,7 +256,7 @@ def _set_ranges(plot: Any, axes: Axes, plots: dict[int, Any], *, square: bool) -
         raise UntranslatableError("equal scales beside others")
     figure = axes.figure
     for shared, name, limits in (
-        (axes.get_shared_x_axes(), "x_range", axes.get_xlim()),
+        (axes.get_shared_x_axes(), "x_range", np.asarray(axes.get_xlim()) * (MS_A_DAY if _has_dates(axes) else 1)),
         (axes.get_shared_y_axes(), "y_range", _limits(axes)),
     ):
         other = next((plots[id(one)] for one in figure.axes if id(one) in plots and shared.joined(axes, one)), None)
