@@ -1,6 +1,6 @@
 """Studies of many logs: overhead, memory, speed of two workers, questions, kills, and scaling to 64 workers.
 
-``python benchmarks/bench_study.py overhead --logs 10000`` (and ``speed``, ``query``, ``kills``, ``scale``). Each
+``python benchmarks/bench_study.py overhead --logs 10000`` (and ``speed``, ``query``, ``kills``, ``scale``, ``tables``). Each
 prints a Markdown table. Overhead is told twice. By the clock, it's the time of two workers less what their logs took.
 By processor time, it's that of client, scheduler and workers, less what the logs took; others don't change it.
 """
@@ -12,6 +12,7 @@ import random
 import subprocess
 import tempfile
 import time
+from datetime import date, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -61,19 +62,51 @@ def query(out: Path) -> None:
     import chladni
 
     found = chladni.results(out)
-    print("\n| question | rows | first [ms] | median of 20 [ms] |\n| --- | --- | --- | --- |")
+    print("\n| question | rows | first [ms] | median of 20 [ms] | its processor time [ms] |")
+    print("| --- | --- | --- | --- | --- |")
     for sql in (
         "select status, count(*) as n from logs group by status",
         "select channel, avg(rms) as rms from levels group by channel",
         "select * from peaks where rank = 1 and step = 'psd'",
         "select l.day, count(*) as n from logs l join channels c using (log) group by l.day",
     ):
-        seconds = []
+        took = []
         for _ in range(21):
-            began_s = time.perf_counter()
+            began_s, began_cpu = time.perf_counter(), time.process_time()
             answer = found.query(sql)
-            seconds.append(time.perf_counter() - began_s)
-        print(f"| `{sql}` | {answer.num_rows} | {seconds[0] * 1e3:.0f} | {sorted(seconds[1:])[10] * 1e3:.0f} |")
+            took.append((time.perf_counter() - began_s, time.process_time() - began_cpu))
+        warm, work = (sorted(one[place] for one in took[1:])[10] * 1e3 for place in (0, 1))
+        print(f"| `{sql}` | {answer.num_rows} | {took[0][0] * 1e3:.0f} | {warm:.0f} | {work:.0f} |")
+
+
+def client_tables(folder: Path, logs: int) -> None:
+    """What the client does for each log: its journal, and the tables of days of 500 logs."""
+    from chladni.io.study.folder import opened_folder
+    from chladni.io.study.tables import packed, tables_of
+
+    def answer(first: int) -> bytes:
+        named = [
+            {"log": f"/data/log{number:06d}.mcap", "day": date(2026, 1, 1) + timedelta(days=number // 500)}
+            for number in range(first, first + 80)
+        ]
+        each = [{**one, "channel": f"/imu{place}.x", "rms": 1.0} for one in named for place in range(3)]
+        peaks = [{**one, "step": "psd", "rank": rank, "frequency_hz": 1.0} for one in each for rank in range(5)]
+        peaks = [{key: value for key, value in one.items() if key != "rms"} for one in peaks]
+        channels = [{key: value for key, value in one.items() if key != "rms"} for one in each]
+        logs = [{**one, "content": "ab" * 32, "status": "done"} for one in named]
+        return packed(tables_of({"logs": logs, "levels": each, "channels": channels, "peaks": peaks}))
+
+    answers = [answer(first) for first in range(0, logs, 80)]
+    with opened_folder(folder / "out", "a recipe", "{}") as out:
+        began_s = time.process_time()
+        for place, content in enumerate(answers):
+            stamps = {f"/data/log{number:06d}.mcap": "1" for number in range(80 * place, 80 * place + 80)}
+            out.take(content, stamps, source="a worker")
+        taken_s = time.process_time()
+        out.settle()
+        settled_s = time.process_time()
+    print("| logs | journal a log [ms] | tables a log [ms] |\n| --- | --- | --- |")
+    print(f"| {logs} | {(taken_s - began_s) / logs * 1e3:.3f} | {(settled_s - taken_s) / logs * 1e3:.3f} |")
 
 
 def speed(folder: Path, logs: int) -> None:
@@ -157,7 +190,7 @@ def row(client: "Client", workers: int, batch_s: float, seconds: float, count: i
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=["overhead", "speed", "query", "kills", "scale"])
+    parser.add_argument("what", choices=["overhead", "speed", "query", "kills", "scale", "tables"])
     parser.add_argument("--logs", type=int)
     parser.add_argument("--runs", type=int, default=30)
     parser.add_argument("--seed", type=int, default=1)
@@ -173,5 +206,7 @@ if __name__ == "__main__":
                 query(given.out)
             case "kills":
                 kills(Path(name), given.runs, given.logs or 24, given.seed)
+            case "tables":
+                client_tables(Path(name), given.logs or 8000)
             case "scale":
                 scale(0.05, given.logs or 200)
