@@ -1,6 +1,6 @@
 """Studies of many logs: overhead, memory, speed of two workers, questions, kills, and scaling to 64 workers.
 
-``python benchmarks/bench_study.py overhead --logs 10000``, and so ``speed``, ``query``, ``kills``, ``scale``, ``tables``.
+``python benchmarks/bench_study.py overhead``, or ``speed``, ``query``, ``kills``, ``scale``, ``tables``.
 Each prints a Markdown table. Overhead is told twice. By the clock, it's the time of two workers less what their logs
 took. By processor time, it's that of client, scheduler and workers, less what the logs took; others don't change it.
 """
