@@ -1,6 +1,6 @@
 """Every instrument there is, on its page."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import pytest
@@ -15,7 +15,14 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
 # In a browser all that are no element, and one element: the pages of elements differ in their knobs only.
-IN_A_BROWSER = [*(name for name in INSTRUMENTS if not name.startswith("element-")), "element-pt2"]
+DIFFERENT = [*(name for name in INSTRUMENTS if not name.startswith("element-")), "element-pt2"]
+
+
+def among(names: Sequence[str]) -> pytest.MarkDecorator:
+    """Run a test of these instruments, and by hand of all others."""
+    return pytest.mark.parametrize(
+        "name", [name if name in names else pytest.param(name, marks=pytest.mark.nightly) for name in INSTRUMENTS]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +38,7 @@ def browser() -> Iterator[Any]:
 
 
 @needs_chromium
-@pytest.mark.parametrize("name", IN_A_BROWSER)
+@among(["robot-arm", "element-pt2"])
 def test_the_page_opens_without_complaint_and_a_knob_moves_its_curves(browser: Any, address: str, name: str) -> None:
     browser.complaints.clear()
     page = open_page(browser, address + name)
@@ -48,7 +55,7 @@ def test_the_page_opens_without_complaint_and_a_knob_moves_its_curves(browser: A
     assert browser.complaints == []
 
 
-@pytest.mark.parametrize("name", list(INSTRUMENTS))
+@among(DIFFERENT)
 def test_the_charts_of_every_instrument_can_be_drawn(name: str) -> None:
     load_toolkit()
     from chladni.viewers.bench.board import SLOTS, Board

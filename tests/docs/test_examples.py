@@ -24,3 +24,17 @@ def test_an_effect_of_ones_own_is_named() -> None:
     command = [sys.executable, EXAMPLES / "own_effect_in_a_diagnosis.py"]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert re.search(r"Most likely cubic drag of (199|200|201)\.", said)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("example", "answer"),
+    [
+        ("gap_of_a_robot_axis.py", r"friction of [12][0-9.]+ .*at guide"),
+        ("gap_of_a_circuit.py", r"explained 0\.[0-5][0-9]* mV"),
+    ],
+)
+def test_measured_machines_get_the_answer_of_their_papers(shared_data: Path, example: str, answer: str) -> None:
+    assert (shared_data / "models").is_dir()
+    said = subprocess.run([sys.executable, EXAMPLES / example], capture_output=True, text=True, check=True).stdout
+    assert re.search(answer, said)
