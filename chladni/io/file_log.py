@@ -11,7 +11,7 @@ import numpy as np
 from chladni.io.files.contents import FileContents, on_common_grids
 from chladni.io.files.formats import read_file
 from chladni.io.known_schemas import likely_role
-from chladni.io.log import Log
+from chladni.io.log import Log, outside
 from chladni.io.log_info import LogInfo, some_of, unread_sentences
 from chladni.io.log_reader import SampleGrid
 from chladni.io.log_survey import survey_file
@@ -123,15 +123,13 @@ class FileLog(Log):
         missing = [] if paths is None else _without(paths, found)
         if missing or not found:
             told = f"between {start_s or 0.0} s and {'its end' if end_s is None else f'{end_s} s'}"
-            told += self._ends(groups, start_s)
+            told += outside(start_s, end_s, self._last_s(groups))
             raise LogError(f"{self._path.name}: {some_of(missing) + ' has ' if missing else ''}no sample {told}")
         return tuple(found)
 
-    def _ends(self, groups: Sequence[TimeSeries], start_s: float | None) -> str:
-        """Say where the samples end, for a window that begins behind them."""
-        last_ns = max((one.start_time_ns + round(one.duration_s * NS_PER_S) for one in groups), default=None)
-        end_s = None if last_ns is None else (last_ns - self.start_time_ns) / NS_PER_S
-        return f" (the file ends at {end_s:.6g} s)" if start_s and end_s is not None and start_s >= end_s else ""
+    def _last_s(self, groups: Sequence[TimeSeries]) -> float | None:
+        ends_ns = [one.start_time_ns + round((one.samples - 1) / one.sample_rate_hz * NS_PER_S) for one in groups]
+        return (max(ends_ns) - self.start_time_ns) / NS_PER_S if ends_ns else None
 
     def blocks(
         self,

@@ -101,6 +101,13 @@ def open_log(
     return open(path, setup=setup, stamp=stamp, limits=limits, sample_rate_hz=sample_rate_hz, **reading)
 
 
+def outside(start_s: float | None, end_s: float | None, last_s: float | None) -> str:
+    """Say where a log ends or begins, for a window that lies behind or before it; nothing for others."""
+    if start_s and last_s is not None and start_s > last_s:
+        return f" (the log ends at {last_s:.6g} s; begin before that)"
+    return " (the log begins at 0 s; end after that)" if end_s is not None and end_s <= 0 else ""
+
+
 class Log(ABC):
     """Channels of one file, of whatever kind; made by `open`.
 

@@ -14,7 +14,7 @@ from chladni.io.catalog import Catalog, read_catalog
 from chladni.io.channel_source import ChannelSource
 from chladni.io.clock.shared_clocks import Key, StreamClock, clocks_of
 from chladni.io.gathering import LostMessages, gather
-from chladni.io.log import Log
+from chladni.io.log import Log, outside
 from chladni.io.log_info import LogInfo, oddities, unread_sentences
 from chladni.io.log_reader import FirstPass, LogReader, SampleGrid, StampedSamples, Window
 from chladni.io.log_survey import survey
@@ -255,14 +255,12 @@ class McapLog(Log):
             end_ns=end_ns,
             log_start_ns=None if start_ns is None or not bounded else max(0, start_ns + earliest - LATENESS_NS),
             log_end_ns=None if end_ns is None or not bounded else max(0, end_ns + latest + LATENESS_NS),
-            told=told + self._ends(start_s),
+            told=told + outside(start_s, end_s, self._last_s()),
         )
 
-    def _ends(self, start_s: float | None) -> str:
-        """Say where the log ends, for a window that begins behind it."""
+    def _last_s(self) -> float | None:
         logged = self._container.time_range_ns
-        end_s = None if logged is None else (logged[1] - self.start_time_ns) / NS_PER_S
-        return f" (the log ends at {end_s:.6g} s)" if start_s and end_s is not None and start_s > end_s else ""
+        return None if logged is None else (logged[1] - self.start_time_ns) / NS_PER_S
 
     def _time_ns(self, time_s: float | None) -> int | None:
         if time_s is None:

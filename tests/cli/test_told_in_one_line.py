@@ -51,7 +51,7 @@ def test_a_channel_that_never_changes_is_told(run: Run, log: Path, arguments: tu
         ),
         (("octaves", "--low", "5000"), "bands can't begin at 5000 Hz"),
         (("srs", "--band", "1-10000"), "half the sample rate, 500 Hz, and 1 to 10000 Hz were asked for"),
-        (("psd", "--start", "100"), "between 100.0 s and its end (the log ends at 9.999 s)"),
+        (("psd", "--start", "100"), "between 100.0 s and its end (the log ends at 9.999 s; begin before that)"),
         (("envelope", "--channel", "m.a", "--band", "300-300.1"), "Measure longer, or take a wider band"),
         (("orders", "--speed", "speed", "--order", "1000"), "order 1000 is above what the samples show: at 10."),
     ],

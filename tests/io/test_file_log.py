@@ -226,8 +226,12 @@ def test_seconds_count_from_the_earliest_sample(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("start_s", "end_s", "words"),
     [
-        (3.0, None, r"force, tip has no sample between 3\.0 s and its end \(the file ends at 2 s\)"),
-        (None, -1.0, r"no sample between 0\.0 s and -1\.0 s"),
+        (
+            3.0,
+            None,
+            r"force, tip has no sample between 3\.0 s and its end \(the log ends at 1\.9\d+ s; begin before that\)",
+        ),
+        (None, -1.0, r"no sample between 0\.0 s and -1\.0 s \(the log begins at 0 s; end after that\)"),
         (1.0, 1.0, "the window from 1.0 s to 1.0 s is empty"),
         (float("nan"), None, "time nan s must be finite"),
     ],
@@ -235,6 +239,12 @@ def test_seconds_count_from_the_earliest_sample(tmp_path: Path) -> None:
 def test_windows_without_samples_are_told(tmp_path: Path, start_s: float, end_s: float, words: str) -> None:
     with chladni.open(table(tmp_path / "a.csv")) as log, pytest.raises(LogError, match=words):
         log.read(["force", "tip"], start_s=start_s, end_s=end_s)
+
+
+def test_a_single_sample_is_no_signal(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time [s],x\n0.0,1.0\n")
+    with pytest.raises(LogError, match=r"a\.csv: one row alone has a time, .* record longer"):
+        chladni.open(tmp_path / "a.csv")
 
 
 def test_channels_come_in_the_order_asked_for(tmp_path: Path) -> None:

@@ -543,7 +543,7 @@ def test_when_nothing_is_uniform_each_topic_says_why(tmp_path: Path) -> None:
     with open_log(tmp_path / "a.mcap") as log, pytest.raises(LogError) as caught:
         log.read()
     told = str(caught.value).removeprefix("a.mcap: no channel has uniform samples in the log: ")
-    assert told.startswith("/one: no rate without at least two stamps; /e1: ")
+    assert told.startswith("/one: no rate without at least two stamps, so record longer; /e1: ")
     assert told.endswith("; and 1 more")
 
 

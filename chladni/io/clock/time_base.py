@@ -393,7 +393,9 @@ def _short(stamps: Whole, samples: int, nominal_hz: float | None) -> TimeBase:
         start_ns=int(stamps[0]) if stamps.size else 0,
         samples=samples,
         verdict="short",
-        advice="a single stamp can't check the stated rate" if known else "no rate without at least two stamps",
+        advice="a single stamp can't check the stated rate"
+        if known
+        else "no rate without at least two stamps, so record longer",
         knots_ns=stamps.copy(),
         knots_index=np.zeros(stamps.size),
     )

@@ -253,6 +253,11 @@ def _at_rate(stamps_ns: Whole, rows: Rows, channels: list[Channel], options: Tim
     try:
         placed = placed_rows(stamps_ns, rows, channels, where=where)
     except LogError as error:
+        if ordered is None and stamps_ns.size < 2:
+            raise LogError(
+                f"{where}: one row alone has a time, and its times don't make a sampled signal: record longer; or, "
+                "of many rows, leave the times out (--time none --rate HZ)"
+            ) from error
         if ordered is None:
             raise LogError(f"{error}; or leave them out (--time none --rate HZ)") from error
         return ordered
