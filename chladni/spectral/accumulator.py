@@ -111,6 +111,22 @@ class SpectraAccumulator(Generic[SpectraT]):
         self._samples = 0
         # A stream may begin or end as quietly as it likes: what counts is the largest of all.
         self.largest = np.zeros(len(self.channels))
+        self._company: tuple[SpectraAccumulator[Any], ...] = ()
+
+    def accompany(self, *others: "SpectraAccumulator[Any]") -> None:
+        """Let other averages of the same segments go along: each segment is transformed once for all of them.
+
+        From here on this one alone is updated. What it holds back is missing in the others until `average_held`.
+
+        Raises
+        ------
+        EstimateError
+            When they average other channels or other segments.
+        """
+        for other in others:
+            self._require_alike(other, ("channels", "sample_rate_hz", "segmentation"))
+            other.stretch, other.largest, other._held = self.stretch, self.largest, HeldSamples()
+        self._company = others
 
     @property
     def averages(self) -> int:
@@ -141,6 +157,8 @@ class SpectraAccumulator(Generic[SpectraT]):
             # A block that ends in invalid samples ends the run, even if the next one begins with valid ones.
             if block.samples > (runs[-1][1] if runs else 0):
                 self._end_run(executor)
+        for other in self._company:
+            other.largest = self.largest
 
     def merge(self, other: Self) -> None:
         """Take in all that another accumulator has seen; `other` stays as it is.
@@ -212,9 +230,11 @@ class SpectraAccumulator(Generic[SpectraT]):
             When not a single whole segment of valid samples has come, or a channel's values are too small to be
             squared.
         """
-        # A copy is finished, not this one: a live display asks often, and batches are to fill as before.
-        with _threads() as executor:
-            flushed = self.flushed(executor)
+        flushed = self
+        if self.segmentation.count(self._held.samples):
+            # A copy is finished, not this one: a live display asks often, and batches are to fill as before.
+            with _threads() as executor:
+                flushed = self.flushed(executor)
         if flushed.count.segments == 0:
             raise EstimateError(self._nothing_averaged())
         require_in_range(self.channels, self.largest)
@@ -251,9 +271,11 @@ class SpectraAccumulator(Generic[SpectraT]):
         self._held.append(values)
 
     def _average_batch(self, values: NDArray[np.floating], executor: Executor | None) -> None:
-        self.average.add(segment_spectra(values, self.segmentation, self._window, executor), executor)
+        spectra = segment_spectra(values, self.segmentation, self._window, executor)
         count = self.segmentation.count(values.shape[1])
-        self.count.add(self._position, count)
+        for one in (self, *self._company):
+            one.average.add(spectra, executor)
+            one.count.add(self._position, count)
         self._position += count
 
     def average_held(self, executor: Executor | None = None) -> None:
@@ -291,6 +313,7 @@ class SpectraAccumulator(Generic[SpectraT]):
             stretch=self.stretch.copy(),
             largest=self.largest[rows],
             _held=self._held.select(rows),
+            _company=(),
         )
         return twin
 
@@ -303,6 +326,7 @@ class SpectraAccumulator(Generic[SpectraT]):
             count=self.count.copy(),
             stretch=self.stretch.copy(),
             _held=self._held.copy(),
+            _company=(),
         )
         twin.average_held(executor)
         return twin
@@ -356,12 +380,15 @@ class SpectraAccumulator(Generic[SpectraT]):
             )
 
     def _require_mergeable(self, other: Self) -> None:
-        for what in ("channels", "sample_rate_hz", "segmentation", "averaging", "time_constant_s"):
+        self._require_alike(other, ("channels", "sample_rate_hz", "segmentation", "averaging", "time_constant_s"))
+        if self.averaging == "exponential":
+            self.stretch.require_before(other.stretch)
+
+    def _require_alike(self, other: "SpectraAccumulator[Any]", attributes: Sequence[str]) -> None:
+        for what in attributes:
             mine, theirs = getattr(self, what), getattr(other, what)
             if mine != theirs:
                 raise EstimateError(f"averages can't be merged: {what} {mine!r} here, {theirs!r} there")
-        if self.averaging == "exponential":
-            self.stretch.require_before(other.stretch)
 
 
 class CrossSpectraAccumulator(SpectraAccumulator[CrossSpectra]):

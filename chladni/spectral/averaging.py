@@ -15,6 +15,7 @@ from chladni.spectral.segment_spectra import run_all
 
 # Lines handled together, so that a product still sits in the cache when it's added to the sum.
 LINES_TOGETHER = 512
+LINES_TURNED = 64
 # Channels squared in one call of BLAS: of fewer, the calls cost more than the pairs that nobody looks at.
 SQUARED_TOGETHER = 4
 
@@ -35,7 +36,10 @@ class SegmentAverage(Protocol):
         """Give an independent copy of some of the channels."""
 
     def mean(self) -> NDArray[Any]:
-        """Give ``[channel, channel, frequency]``, conj(X_i) X_j averaged or held, unscaled; or its real diagonal."""
+        """Give ``[channel, channel, frequency]``, conj(X_i) X_j averaged or held, unscaled; or its real diagonal.
+
+        The array is the caller's own.
+        """
 
     def numbers(self) -> dict[str, NDArray[Any]]:
         """Give what was summed, for another one's `add_numbers`; `EstimateError` where that makes no sense."""
@@ -153,10 +157,14 @@ class WeightedSum(_Sum):
 
     def _density(self) -> Complex:
         # conj(a + jb)(c + jd) = (ac + bd) + j(ad - bc)
-        products = self.products.transpose(1, 2, 0)
-        density = np.empty((products.shape[0] // 2, products.shape[1] // 2, products.shape[2]), dtype=np.complex128)
-        density.real = products[0::2, 0::2] + products[1::2, 1::2]
-        density.imag = products[0::2, 1::2] - products[1::2, 0::2]
+        lines, parts, _ = self.products.shape
+        density = np.empty((parts // 2, parts // 2, lines), dtype=np.complex128)
+        # Turned over in portions that the cache holds: memory has lines first, the result has them last.
+        for first in range(0, lines, LINES_TURNED):
+            some = slice(first, first + LINES_TURNED)
+            products = self.products[some]
+            density.real[..., some] = (products[:, 0::2, 0::2] + products[:, 1::2, 1::2]).transpose(1, 2, 0)
+            density.imag[..., some] = (products[:, 0::2, 1::2] - products[:, 1::2, 0::2]).transpose(1, 2, 0)
         return density
 
 
@@ -227,7 +235,7 @@ class _Hold(ABC):
 
     def mean(self) -> NDArray[Any]:
         """See `SegmentAverage`."""
-        return np.ascontiguousarray(np.moveaxis(self.held, 0, -1))
+        return np.array(np.moveaxis(self.held, 0, -1), order="C")
 
     def _keep_larger(self, lines: slice, candidate: NDArray[Any]) -> None:
         held = self.held[lines]

@@ -25,6 +25,8 @@ FAST_S = 0.125
 LEAST_SAMPLES = 64
 # More windows than this a picture has no room for; two neighbours then become one.
 MOST_WINDOWS = 1024
+# Windows that are entered together.
+WINDOWS_TOGETHER = 64
 # Of the record, to tell the scatter of its RMS.
 BATCHES = 32
 WINDOW_NUMBERS = ("samples", "number", "moments")
@@ -182,6 +184,8 @@ class LevelsAccumulator:
         for filter_, windows in zip(self._filters, self._windows, strict=False):
             for passed in () if self._put_together else filter_.rest():
                 self._add(windows, passed)
+        for windows in self._windows:
+            windows.join()
         if not any(windows.moments.samples.any() for windows in self._windows):
             raise EstimateError("no sample is a number (all are marked invalid); leave the channels out")
         samples = max(windows.samples for windows in self._windows)
@@ -247,6 +251,8 @@ class _Windows:
         self.samples = samples
         self.number: Whole = np.empty(0, dtype=np.int64)
         self.moments = _Moments._make(np.empty((len(_Moments._fields), channels, 0)))
+        # Since the last join: a join copies all windows, and short blocks are many.
+        self._fresh: list[tuple[Whole, _Moments]] = []
 
     def add(self, series: TimeSeries, first: int) -> None:
         """Take samples in, the first of which is number `first` of the stream."""
@@ -254,9 +260,16 @@ class _Windows:
             return
         number = np.arange(first // self.samples, (first + series.samples - 1) // self.samples + 1)
         starts = np.maximum(number * self.samples - first, 0)
-        fresh = _Moments.of(series.values.astype(np.float64, copy=False), series.valid, starts)
-        self.moments = _Moments.joined([self.moments, fresh], lambda arrays: np.concatenate(arrays, axis=-1))
-        self.number = np.concatenate([self.number, number])
+        self._fresh.append((number, _Moments.of(series.values.astype(np.float64, copy=False), series.valid, starts)))
+        if sum(number.size for number, _ in self._fresh) >= WINDOWS_TOGETHER:
+            self.join()
+
+    def join(self) -> None:
+        """Enter what came since the last join."""
+        numbers, fresh = zip((self.number, self.moments), *self._fresh, strict=True)
+        self._fresh = []
+        self.moments = _Moments.joined(fresh, lambda arrays: np.concatenate(arrays, axis=-1))
+        self.number = np.concatenate(numbers)
         self.coarsen(self.samples)
         while self.number.size > MOST_WINDOWS:
             self.coarsen(2 * self.samples)

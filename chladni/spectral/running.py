@@ -188,12 +188,12 @@ class RunningAverages:
         EstimateError
             Before the first whole segment.
         """
-        # What waits for its batch to fill would be transformed again at each look.
-        self._best.powers[averaging].average_held()
+        self._best.average_held()
         found = power_spectral_density(self._best.powers[averaging].result(sample_rate_hz=sample_rate_hz))
         if self._living is None:
             return (found,)
         names = [channel.name for channel in self.channels if channel.name not in self._living.names]
+        self._all.average_held()
         try:
             before = power_spectral_density(self._all.powers[averaging].result(sample_rate_hz=sample_rate_hz))
         except EstimateError:
@@ -210,14 +210,14 @@ class RunningAverages:
         """
         if self._best.pairs is None:
             raise EstimateError("spectra of pairs of channels aren't averaged; ask for them")
-        self._best.pairs.average_held()
+        self._best.average_held()
         return self._best.pairs.result(sample_rate_hz=sample_rate_hz)
 
     def recent_spectra(self) -> CrossSpectra:
         """Give the exponential average of the cross-spectra; errors as for `spectra`."""
         if self._best.fading is None:
             raise EstimateError("spectra of pairs of channels aren't averaged exponentially; ask for them")
-        self._best.fading.average_held()
+        self._best.average_held()
         return self._best.fading.result()
 
     def response(
@@ -293,16 +293,25 @@ class _Spectra:
             ),
         )
 
+    def __post_init__(self) -> None:
+        # A segment is transformed once, whatever it is averaged for.
+        lead, *others = self.powers.values()
+        lead.accompany(*others, *(pairs for pairs in (self.pairs, self.fading) if pairs is not None))
+
+    @property
+    def _lead(self) -> AutoSpectraAccumulator:
+        return self.powers["linear"]
+
     @property
     def names(self) -> list[str]:
-        return [channel.name for channel in self.powers["linear"].channels]
+        return [channel.name for channel in self._lead.channels]
 
     def update(self, block: TimeSeries) -> None:
-        for accumulator in self.powers.values():
-            accumulator.update(block)
-        for pairs in (self.pairs, self.fading):
-            if pairs is not None:
-                pairs.update(block)
+        self._lead.update(block)
+
+    def average_held(self) -> None:
+        """Average what waits for its batch to fill, which would be transformed again at each look."""
+        self._lead.average_held()
 
     def select(self, names: Sequence[str]) -> "_Spectra":
         return _Spectra(

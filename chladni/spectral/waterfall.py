@@ -149,7 +149,7 @@ class WaterfallAccumulator:
             held = self._held.joined(values)
             whole = held[:, : self.segmentation.length_of(count)]
             spectra = segment_spectra(whole, self.segmentation, self._window)
-            self._slices.add(np.abs(spectra.transpose(1, 2, 0)) ** 2)
+            self._slices.add((spectra.real**2 + spectra.imag**2).transpose(1, 2, 0))
             # What the next segment begins with stays; it overlaps the last one done.
             self._held.replace(held[:, count * self.segmentation.hop :])
 

@@ -4,7 +4,10 @@ import pickle
 import tracemalloc
 
 import numpy as np
+import pytest
 
+from chladni.signals.errors import EstimateError
+from chladni.spectral.accumulator import AutoSpectraAccumulator
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.running import RunningAverages, running_segmentation
 from chladni.spectral.waterfall import WaterfallAccumulator
@@ -85,3 +88,20 @@ def test_a_waterfall_holds_its_slices_and_not_the_segments_that_they_are_made_of
         tracemalloc.stop()
     # 16 times as many segments to a slice; what the test itself holds is a few kB.
     assert max(held[32:]) < 2 * max(held[2:4])
+
+
+def test_a_result_asked_for_again_is_the_same() -> None:
+    """Powers of one channel lie in memory as the result does: what the result is scaled by must not reach them."""
+    whole = series(noise(1, 20_000), rate_hz=RATE_HZ)
+    averages = RunningAverages(whole.channels, RATE_HZ, PLAN, pairs=False)
+    averages.update(whole)
+    for kind in ("linear", "exponential", "peak-hold"):
+        first = averages.densities(kind)[0].values.copy()
+        np.testing.assert_array_equal(averages.densities(kind)[0].values, first)
+
+
+def test_averages_of_other_segments_cant_go_along() -> None:
+    channels = series(noise(1, 1), rate_hz=RATE_HZ).channels
+    lead = AutoSpectraAccumulator(channels, RATE_HZ, PLAN)
+    with pytest.raises(EstimateError, match="sample_rate_hz 500.0 here, 250.0 there"):
+        lead.accompany(AutoSpectraAccumulator(channels, RATE_HZ / 2, PLAN))
