@@ -20,7 +20,9 @@ from chladni.io.stamps import StampRequest
 from chladni.signals.channel import Channel, Names, as_names
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.live_state import EventKind, LiveEvent, LiveState
+from chladni.signals.process_memory import trim_memory
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.wording import near_matches
 from chladni.spectral.change_watch import ChangeWatch, SignalChange
 from chladni.spectral.running import TIME_CONSTANT_S, RunningAverages, running_segmentation
 from chladni.spectral.severity import Machine
@@ -38,6 +40,8 @@ GATHER_S: Final = 0.01
 #: How often averages are renewed, and modes looked for.
 AVERAGES_EVERY_S: Final = 0.5
 MODES_EVERY_S: Final = 5.0
+#: How often memory that is free is given back to the system.
+TRIM_EVERY_S: Final = 60.0
 #: More channels than these, and modes of the present are looked for in the average over all.
 MOST_FADING: Final = 32
 #: Windows that wait to be compared with what is usual; a minute of them, or more.
@@ -182,6 +186,7 @@ class _Session:
         self._spectra_due = Schedule(AVERAGES_EVERY_S)
         self._pairs_due = Schedule(2 * AVERAGES_EVERY_S)
         self._levels_due = Schedule(2 * AVERAGES_EVERY_S)
+        self._trim_due = Schedule(TRIM_EVERY_S)
         self._torques: dict[tuple[Channel, ...], TorqueResidual | None] = {}
         self._pairs: dict[tuple[Channel, ...], CrossSpectra] = {}
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="modes")
@@ -206,6 +211,9 @@ class _Session:
                 yield self._state(blocks, fresh=fresh, ended=ended)
             if ended:
                 return
+            if self._trim_due.due:
+                trim_memory()
+                self._trim_due.done(0.0)
             if not any(block.duration_s > POLL_S for block in blocks):
                 # Single messages cost as much as some together.
                 time.sleep(GATHER_S)
@@ -255,7 +263,18 @@ class _Session:
                 continue
             self._end_ns = max(self._end_ns, block.start_time_ns + round(block.duration_s * NS_PER_S))
             taken.append(block)
+        if taken:
+            self._require_references()
         return tuple(taken)
+
+    def _require_references(self) -> None:
+        """Tell which references no channel is; they may come."""
+        known = [channel.name for channels in self._grids for channel in channels]
+        for name in self._options.references or ():
+            if name not in known:
+                self._once(
+                    f"no frequency response to {name} yet: no channel is named so; {near_matches(name, known)}"
+                )
 
     def _average(self, block: TimeSeries) -> None:
         grid = self._grids.get(block.channels) or self._begin(block)

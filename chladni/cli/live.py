@@ -175,6 +175,7 @@ def live(
 ) -> None:
     """Averages, modes and what changes, of a log that is being written; Ctrl-C ends it with everything written."""
     from chladni.apps.live_document import EventBook, live_document, live_study
+    from chladni.signals.process_memory import return_memory
 
     is_file = source != "-" and "://" not in source and not source.startswith("audio:")
     require_places(
@@ -183,6 +184,7 @@ def live(
         folders={"--figures": figures},
     )
     out, book = Output(json), EventBook()
+    return_memory()
     # Samples, pictures and modes take turns at Python's lock: shorter turns, sooner pictures.
     sys.setswitchinterval(TURN_S)
     with _stopping() as stop:

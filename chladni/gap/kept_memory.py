@@ -1,12 +1,7 @@
 """Memory that a process keeps for its next arrays."""
 
-import ctypes
-import platform
-
 from chladni.gap.calibration import SPARE_BYTES
-
-#: Options of glibc's mallopt (malloc.h); the second takes an eighth of what is spare at most.
-_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
+from chladni.signals.process_memory import MMAP_THRESHOLD, TRIM_THRESHOLD, set_allocator
 
 
 def keep_memory() -> bool:
@@ -20,8 +15,4 @@ def keep_memory() -> bool:
     -------
     Whether it was done; other libraries than glibc are left as they are.
     """
-    if platform.libc_ver()[0] != "glibc":
-        return False
-    library = ctypes.CDLL(None)
-    options = ((_MMAP_THRESHOLD, SPARE_BYTES // 8), (_TRIM_THRESHOLD, SPARE_BYTES))
-    return all(library.mallopt(option, value) == 1 for option, value in options)
+    return set_allocator({MMAP_THRESHOLD: SPARE_BYTES // 8, TRIM_THRESHOLD: SPARE_BYTES})

@@ -189,6 +189,17 @@ def _topic_of(text: str, topics: Collection[str]) -> tuple[str, int]:
     )
 
 
+def starts(topic: str, text: str) -> bool:
+    """Whether a topic starts a path.
+
+    Examples
+    --------
+    >>> starts("/arm", "/arm.velocity[0]"), starts("/arm", "/arm2.velocity[0]")
+    (True, False)
+    """
+    return _length_of(topic, text) is not None
+
+
 def _length_of(topic: str, text: str) -> int | None:
     """How much of a path is its topic, as it is or in quotes; None where it's another one."""
     for written in (topic, quoted(topic), in_quotes(topic)):

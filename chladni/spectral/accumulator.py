@@ -125,7 +125,7 @@ class SpectraAccumulator(Generic[SpectraT]):
         """
         for other in others:
             self._require_alike(other, ("channels", "sample_rate_hz", "segmentation"))
-            other.stretch, other.largest, other._held = self.stretch, self.largest, HeldSamples()
+            other.stretch, other.largest = self.stretch, self.largest
         self._company = others
 
     @property

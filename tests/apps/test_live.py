@@ -138,3 +138,12 @@ def test_the_document_and_the_study_hold_what_was_found(last: LiveState) -> None
     study = live_study(last, ["first"])
     assert study.findings == ("first",)
     assert study.peaks
+
+
+def test_a_reference_that_no_channel_is_is_told(log: Path) -> None:
+    states = list(live(Bits(log.read_bytes(), (1 << 20,)), references=["/shaker.wrench.torque.z"], modes_every_s=0))
+    told = [event.text for state in states for event in state.events if event.kind == "note"]
+    assert told == [
+        f"no frequency response to /shaker.wrench.torque.z yet: no channel is named so; did you mean {FORCE}?"
+    ]
+    assert states[-1].response is None

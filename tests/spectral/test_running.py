@@ -103,5 +103,5 @@ def test_a_result_asked_for_again_is_the_same() -> None:
 def test_averages_of_other_segments_cant_go_along() -> None:
     channels = series(noise(1, 1), rate_hz=RATE_HZ).channels
     lead = AutoSpectraAccumulator(channels, RATE_HZ, PLAN)
-    with pytest.raises(EstimateError, match="sample_rate_hz 500.0 here, 250.0 there"):
+    with pytest.raises(EstimateError, match=r"sample_rate_hz 500\.0 here, 250\.0 there"):
         lead.accompany(AutoSpectraAccumulator(channels, RATE_HZ / 2, PLAN))

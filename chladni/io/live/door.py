@@ -8,7 +8,7 @@ from chladni.io.live.reception import MessageSource, Samples
 from chladni.io.setup import Setup, load_setup
 from chladni.io.stamps import StampRequest
 from chladni.signals.channel import Channel
-from chladni.signals.errors import SetupError
+from chladni.signals.errors import LogError, SetupError
 from chladni.signals.geometry import Geometry
 
 if TYPE_CHECKING:
@@ -105,4 +105,6 @@ def _messages(source: str, patience_s: float | None) -> MessageSource:
         from chladni.io.live.foxglove import FoxgloveServer
 
         return FoxgloveServer(source, patience_s=patience_s)
+    if "://" in source:
+        raise LogError(f"{source}: no source; give an MCAP log, - for standard input, or a server's ws://HOST:PORT")
     return FollowedFile(source, patience_s=patience_s)

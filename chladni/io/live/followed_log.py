@@ -123,6 +123,8 @@ class FollowedFile(_McapSource):
             if not stat.S_ISREG(self._path.stat().st_mode):
                 raise LogError(f"{path}: not a file; give an MCAP log, - for standard input, or ws://HOST:PORT")
             self._file = self._path.open("rb", buffering=0)
+        except FileNotFoundError as error:
+            raise LogError(f"{path}: there is no such file; start its recorder first, or name another log") from error
         except OSError as error:
             raise LogError(f"{path}: can't be opened: {error.strerror or error}") from error
         # The same place read again is space that isn't written yet: then it's looked at now and then only.

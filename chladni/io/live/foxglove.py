@@ -78,6 +78,7 @@ class FoxgloveServer(MessageSource):
         self._told: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._channels: dict[int, McapChannel] = {}
         self._ids: dict[Key, int] = {}
+        self._full = False
         self._sequence: Counter[int] = Counter()
         self._closed = threading.Event()
         self._connection = _connect(address)
@@ -220,6 +221,9 @@ class FoxgloveServer(MessageSource):
             if key in self._ids:
                 return self._ids[key]
             if len(self._ids) >= MOST_CHANNELS:
+                if not self._full:
+                    self._told.put(f"{self.name}: offers more than {MOST_CHANNELS} channels; the others are left out")
+                self._full = True
                 return None
             number = len(self._ids) + 1
             try:

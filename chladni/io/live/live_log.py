@@ -15,6 +15,7 @@ from chladni.io.live.reception import MessageSource, Samples, Told
 from chladni.io.live.stream_places import StreamPlaces, joined_pieces
 from chladni.io.log_info import some_of
 from chladni.io.mcap.message_batch import MessageBatch
+from chladni.io.message_path import starts
 from chladni.io.placement import Placement, StatedRate
 from chladni.io.setup import Setup
 from chladni.io.shared_grid import group_placements
@@ -24,7 +25,7 @@ from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
 from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import NS_PER_S
-from chladni.signals.wording import counted
+from chladni.signals.wording import counted, near_matches
 
 if TYPE_CHECKING:
     from chladni.io.number_lists import NumberLists
@@ -37,6 +38,8 @@ ENOUGH_MESSAGES: Final = 64
 MOST_MESSAGES: Final = 1024
 #: Bytes held of the beginning, at most.
 MOST_HELD_BYTES: Final = 256 << 20
+#: Reasons that are told where a source gave nothing.
+MOST_REASONS: Final = 3
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -89,6 +92,8 @@ class LiveLog:
         self._waiting: dict[int, list[MessageBatch]] = {}
         self._given_up: set[str] = set()
         self._ignored: set[int] = set()
+        # Topics of which messages came.
+        self._heard: set[str] = set()
         self._tried: dict[int, int] = {}
         #: Lists of numbers in messages, an element for each joint or motor, of the topics known so far.
         self.number_lists: tuple[NumberLists, ...] = ()
@@ -139,7 +144,7 @@ class LiveLog:
             told += more
         told += self._losses()
         if found.ended and not self._grids:
-            raise LogError(self._nothing())
+            raise LogError(self._nothing(told))
         return Samples(blocks=tuple(blocks), told=tuple(told), ended=found.ended)
 
     def finish(self) -> Samples:
@@ -168,6 +173,7 @@ class LiveLog:
             if part is not None:
                 known.setdefault(id(part), (part, []))[1].append(batch)
             elif batch.channel_id not in self._ignored:
+                self._heard.add(self._source.channels[batch.channel_id].topic)
                 self._waiting.setdefault(batch.channel_id, []).append(batch)
                 first, last, size = self._held
                 self._held = (
@@ -217,7 +223,10 @@ class LiveLog:
             if not ended and not self._settled():
                 return []
             self._begun = True
-            return self._look(self._waiting.keys(), first=True, ended=ended)
+            told = self._look(self._waiting.keys(), first=True, ended=ended)
+            if (missing := self._not_there()) and not ended:
+                told.append(Told(kind="topic", text=f"{self._lacks(missing)}; waiting for it"))
+            return told
         ripe = [channel for channel in self._waiting if ended or self._ripe(channel)]
         return self._look(ripe, first=False, ended=ended) if ripe else []
 
@@ -265,9 +274,7 @@ class LiveLog:
         topics = {getattr(one, "topic", "") for one in channels}
         return replace(
             self._setup,
-            channels=tuple(
-                one for one in self._setup.channels if any(one.path.startswith(topic) for topic in topics)
-            ),
+            channels=tuple(one for one in self._setup.channels if any(starts(topic, one.path) for topic in topics)),
             batches={topic: one for topic, one in self._setup.batches.items() if topic in topics},
         )
 
@@ -275,7 +282,7 @@ class LiveLog:
         if self._wanted is None:
             return catalog.channels
         topics = tuple(catalog.topics)
-        mine = [path for path in self._wanted if any(path.startswith(topic) for topic in topics)]
+        mine = [path for path in self._wanted if any(starts(topic, path) for topic in topics)]
         return tuple(catalog.resolve(path) for path in dict.fromkeys(mine))
 
     def _begin_streams(
@@ -375,11 +382,24 @@ class LiveLog:
         self._waiting.pop(channel, None)
         self._ignored.add(channel)
 
-    def _nothing(self) -> str:
-        return (
-            f"{self.name}: it ended and no channel had uniform samples; 'chladni info LOG' tells what a finished log "
-            "holds"
-        )
+    def _nothing(self, told: Sequence[Told]) -> str:
+        reasons = [one.text.removeprefix(f"{self.name}: ") for one in told]
+        if missing := self._not_there():
+            reasons = [self._lacks(missing)]
+        if not reasons:
+            reasons = ["no channel has uniform samples; 'chladni info LOG' tells what a finished log holds"]
+        more = f"; and {len(reasons) - MOST_REASONS} more" if len(reasons) > MOST_REASONS else ""
+        return f"{self.name}: it ended without samples: {'; '.join(reasons[:MOST_REASONS])}{more}"
+
+    def _not_there(self) -> list[str]:
+        """Paths asked for of which no message has come."""
+        return [path for path in self._wanted or () if not any(starts(topic, path) for topic in self._heard)]
+
+    def _lacks(self, paths: Sequence[str]) -> str:
+        topics = [one.topic for one in self._source.channels.values()]
+        if any(starts(topic, paths[0]) for topic in topics):
+            return f"no message of {some_of(paths)} has come"
+        return f"no topic starts {some_of(paths)}; {near_matches(paths[0].split('.')[0], topics)}"
 
 
 def _without_numbers(held: HeldMessages, streams: Sequence[Stream]) -> list[str]:

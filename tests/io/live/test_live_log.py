@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chladni.io.live.door import open_live
 from chladni.io.live.followed_log import FollowedFile
 from chladni.io.log import open_log
 from chladni.signals.errors import LogError
@@ -95,8 +96,10 @@ def test_a_topic_that_appears_late_is_told_and_comes_apart(tmp_path: Path) -> No
     blocks, told = read_live(Bits(path.read_bytes(), (4000,)), channels=names)
     late = [one for one in blocks if len(one.channels) == 1]
     np.testing.assert_array_equal(joined(late), finished(path, names[3:]))
-    assert [one.kind for one in told] == ["topic"]
-    assert "/arm" in told[0].text
+    assert [one.text for one in told] == [
+        f"no message of {names[3]} has come; waiting for it",
+        "/arm appeared; it is averaged apart from the others",
+    ]
 
 
 def test_a_log_that_is_cut_gives_all_whole_messages_and_says_so(tmp_path: Path) -> None:
@@ -174,3 +177,29 @@ def test_fields_that_nobody_measures_stop_no_average(tmp_path: Path) -> None:
     assert "/imu.linear_acceleration.x" in names
     assert "/imu.linear_acceleration.y" not in names
     assert ["/imu.linear_acceleration.y" in one.text for one in told] == [True]
+
+
+def test_a_channel_of_which_no_topic_is_there_is_told(tmp_path: Path) -> None:
+    path = write_imus(tmp_path / "a.mcap", STAMPS)
+    _, told = read_live(Bits(path.read_bytes()), channels=[*CHANNELS, "/imu2.linear_acceleration.x"])
+    why = "no topic starts /imu2.linear_acceleration.x; did you mean /imu?; waiting for it"
+    assert [one.text for one in told] == [why]
+
+
+@pytest.mark.parametrize(
+    ("length", "why"),
+    [
+        (0, "ended within its first 8 bytes; it holds no message"),
+        (500, "without a footer"),
+        (None, "no topic starts /nowhere.x; there are: /imu"),
+    ],
+)
+def test_a_source_that_gave_nothing_says_why(tmp_path: Path, length: int | None, why: str) -> None:
+    content = write_imus(tmp_path / "a.mcap", STAMPS).read_bytes()[:length]
+    with pytest.raises(LogError, match=f"^bits: it ended without samples: .*{why}"):
+        read_live(Bits(content), channels=["/nowhere.x"] if length is None else None)
+
+
+def test_what_is_no_source_is_refused() -> None:
+    with pytest.raises(LogError, match=r"http://127\.0\.0\.1: no source; give an MCAP log"):
+        open_live("http://127.0.0.1")
