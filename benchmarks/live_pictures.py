@@ -96,7 +96,7 @@ def play(options: argparse.Namespace, port: int) -> int:
     client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
     recording = live_recording(str(uuid4()))
     recording.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy")
-    drawing, next_s = LiveDrawing(recording, following=True), EVERY_S
+    drawing, next_s = LiveDrawing(recording), EVERY_S
     with tempfile.TemporaryDirectory() as folder:
         write_mcap(make_demo_log().series, Path(folder) / "whole.mcap", layout="batches", block_s=0.1)
         path = Path(folder) / "arm.mcap"

@@ -1,10 +1,11 @@
 """``chladni live``: a log that is still being written, a server, an instrument."""
 
+import os
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 MEGABYTE = 1_000_000
 TURN_S = 1e-3
+ENDING = b"\nending: the last averages are written; Ctrl-C again ends without them\n"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -288,6 +290,9 @@ def _stopping() -> Iterator[threading.Event]:
             signal.signal(which, before.get(which) or signal.SIG_DFL)
             signal.raise_signal(which)
         stop.set()
+        # Who sees nothing for seconds presses again, and then nothing is written. `print` isn't safe in here.
+        with suppress(OSError):
+            os.write(2, ENDING)
 
     if threading.current_thread() is threading.main_thread():
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):

@@ -45,7 +45,7 @@ def test_options_that_cant_be_are_one_line(run: Run, arm: Path, tmp_path: Path) 
         (("--keep", "1"), "--keep 1 MB is too little"),
         (("--save", tmp_path / "a.rrd", "--web"), "give one of them"),
         (("--time-constant", "0"), "time_constant_s is 0"),
-        (("--channel", "/nowhere.x"), "no channel"),
+        (("--channel", "/nowhere.x"), "no topic starts /nowhere.x; there are: /arm"),
     ):
         found = run("live", arm, "--no-view", *words)
         assert found.code == 2
@@ -67,16 +67,19 @@ def test_ctrl_c_leaves_recording_and_document(arm: Path, tmp_path: Path) -> None
         "--json",
         tmp_path / "a.json",
     ]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=False) as process:
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) as process:
         assert process.stdin is not None
         assert process.stdout is not None
+        assert process.stderr is not None
         process.stdin.write(content[: 2 * len(content) // 3])
         process.stdin.flush()
         # The first line says that samples came.
         process.stdout.readline()
         time.sleep(0.5)
         os.kill(process.pid, signal.SIGINT)
-        process.wait(timeout=30)
+        process.wait(timeout=120)
+        assert process.stderr.read() == b"\nending: the last averages are written; Ctrl-C again ends without them\n"
     assert process.returncode == 0
     document = json.loads((tmp_path / "a.json").read_text())
     assert document["duration_s"] > 1

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun_cli
+from rerun.blueprint.components import PlayState
 
 from chladni.signals.live_state import LiveEvent, LiveState
 from chladni.signals.power_spectral_density import PowerSpectralDensity
@@ -17,6 +18,7 @@ from chladni.viewers.rerun.live_targets import Painter, RecordingFile, Target
 from tests.viewers.rrd import Contents
 
 RATE_HZ, START_NS = 1000.0, 1_700_000_000_000_000_000
+PLAY_STATE = "TimePanelBlueprint:play_state"
 RERUN = Path(rerun_cli.__file__).parent / "rerun"
 
 
@@ -59,6 +61,9 @@ def test_a_recording_holds_every_sample_and_every_event(tmp_path: Path) -> None:
     np.testing.assert_array_equal(waves, np.concatenate([one.series[0].values for one in shown], axis=1).T)
     assert contents.column("/events", "TextLog:text") == [["one missing"]]
     assert "What happened and changed" in contents.view_names()
+    # It opens at its end: at its first moment nothing is averaged yet.
+    (cursor,) = [row[PLAY_STATE] for row in contents.blueprint if PLAY_STATE in row]
+    assert cursor == [PlayState.Following.value]
     subprocess.run([RERUN, "rrd", "verify", tmp_path / "a.rrd"], check=True, capture_output=True)
 
 

@@ -38,8 +38,9 @@ VALUES_A_SECOND: Final = 300_000
 CURVES_EVERY_S: Final = 0.5
 #: Points of a curve: about as many as a window has pixels.
 POINTS: Final = 1200
-#: Size of canvases.
+#: Size of canvases; coherence has less height.
 CANVAS: Final = (1000.0, 480.0)
+FLAT: Final = 220.0
 SPAN_DB: Final = 100.0
 STEP_DB: Final = 20.0
 
@@ -52,7 +53,15 @@ class _Plane:
     canvas: Canvas | None = None
 
     def fitted(
-        self, recording: rr.RecordingStream, high_hz: float, levels: Real, *, name: str, step: float, span: float
+        self,
+        recording: rr.RecordingStream,
+        high_hz: float,
+        levels: Real,
+        *,
+        name: str,
+        step: float,
+        span: float,
+        height: float = CANVAS[1],
     ) -> Canvas:
         """Give the canvas that holds these levels, with its axes drawn."""
         known = levels[np.isfinite(levels)]
@@ -63,7 +72,7 @@ class _Plane:
         if canvas is None or top > canvas.y_range[1] or bottom < canvas.y_range[0] or canvas.x_range[1] != high_hz:
             if canvas is not None and canvas.x_range[1] == high_hz:
                 top, bottom = max(top, canvas.y_range[1]), min(bottom, canvas.y_range[0])
-            canvas = Canvas(width=CANVAS[0], height=CANVAS[1], x_range=(0.0, high_hz), y_range=(bottom, top))
+            canvas = Canvas(width=CANVAS[0], height=height, x_range=(0.0, high_hz), y_range=(bottom, top))
             canvas.draw_axes(recording, f"{self.path}/axes", x_name="Hz", y_name=name)
             self.canvas = canvas
         return canvas
@@ -76,13 +85,10 @@ class LiveDrawing:
     ----------
     recording
         Where to.
-    following
-        Whether the viewer's cursor is to follow the newest sample.
     """
 
-    def __init__(self, recording: rr.RecordingStream, *, following: bool) -> None:
+    def __init__(self, recording: rr.RecordingStream) -> None:
         self._recording = recording
-        self._following = following
         self._style: Style | None = None
         self._channels: tuple[Channel, ...] = ()
         self._grids: list[tuple[tuple[Channel, ...], float]] = []
@@ -221,7 +227,13 @@ class LiveDrawing:
             self._legend(path, canvas, [response.responses[row] for row in rows], over=reference)
             path = folder("coherence", group.name)
             canvas = self._plane(path).fitted(
-                self._recording, float(coherent.frequency_hz[-1]), np.array([0.0, 0.95]), name="", step=0.2, span=1.0
+                self._recording,
+                float(coherent.frequency_hz[-1]),
+                np.array([0.0, 0.95]),
+                name="",
+                step=0.2,
+                span=1.0,
+                height=FLAT,
             )
             values = coherent.values[rows]
             self._strips(f"{path}/curves", state.time_s, canvas, coherent.frequency_hz, values, colours, 255, 1.25)
@@ -339,7 +351,8 @@ class LiveDrawing:
             rrb.Tabs(*pages, active_tab=0),
             rrb.BlueprintPanel(state="hidden"),
             rrb.SelectionPanel(state="hidden"),
-            rrb.TimePanel(state="collapsed", timeline=TIME, play_state="following" if self._following else "paused"),
+            # The newest sample is what one looks for, in a file as well: at its first none there is nothing yet.
+            rrb.TimePanel(state="collapsed", timeline=TIME, play_state="following"),
             auto_layout=False,
             auto_views=False,
         )
@@ -360,8 +373,8 @@ class LiveDrawing:
         name = f"{what}, {path.rsplit('/', 1)[-1].replace('_', ' ')}"
         if canvas is None:
             raise AssertionError("a plane without a canvas has no view")
-        # Above stands the name of the axis.
-        return canvas.view(path, name, left=110.0, above=100.0)
+        # Above stands the name of the axis, where it has one.
+        return canvas.view(path, name, left=110.0, above=30.0 if canvas.height == FLAT else 100.0)
 
 
 def _last(seconds: float) -> rrb.TimeAxis:
@@ -436,7 +449,7 @@ def rehearse() -> None:
         bandwidth_hz=1.5,
         provenance=density.provenance,
     )
-    drawing = LiveDrawing(recording, following=False)
+    drawing = LiveDrawing(recording)
     state = LiveState(title="", series=(series,), fresh=True, densities=(density,), waterfalls=(fall,), ended=True)
     drawing.draw(state)
     drawing.arrange()

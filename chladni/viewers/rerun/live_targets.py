@@ -99,7 +99,7 @@ class RecordingFile(Target):
         self._recording = live_recording(self._id)
         self._way = _WayToFile(self.path)
         self._recording.save(self._way.entrance)
-        self._drawing = LiveDrawing(self._recording, following=False)
+        self._drawing = LiveDrawing(self._recording)
         self._drawn = False
 
     def prepare(self) -> None:
@@ -243,7 +243,7 @@ class Viewer(Target):
         self._web = web
         self._recording = live_recording(str(uuid4()))
         self._recording.connect_grpc(f"rerun+http://{LOOPBACK}:{data_port}/proxy")
-        self._drawing = LiveDrawing(self._recording, following=True)
+        self._drawing = LiveDrawing(self._recording)
 
     def prepare(self) -> None:
         """Draw something that nobody sees: what is imported for it takes seconds."""
