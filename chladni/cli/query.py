@@ -9,6 +9,7 @@ from chladni.cli import options
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import NOTHING, number
+from chladni.signals.wording import counted
 
 
 def query(
@@ -33,7 +34,7 @@ def query(
     if not columns:
         out.line("done; the question gives no rows")
     else:
-        out.table(f"{answer.num_rows} rows", columns, [[_cell(row[one]) for one in columns] for row in rows])
+        out.table(counted(answer.num_rows, "row"), columns, [[_cell(row[one]) for one in columns] for row in rows])
     out.json({"format": "chladni.query/1", "columns": columns, "rows": [_plain(row) for row in rows]})
     if csv is not None:
         from chladni.io.study.results import write_answer

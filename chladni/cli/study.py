@@ -28,7 +28,7 @@ OUTSIDE = 3
 # As many as one reads; the tables hold all.
 MOST_CHANGES, MOST_FAILURES = 30, 30
 ALL_FAILURES = "select log, step, reason from failures"
-ALL_DAMAGE = "select log, sentence from findings join logs using (log) where damage > 0"
+ALL_DAMAGE = "select log, sentence from findings join logs using (log) where damage > 0 and step = 'info'"
 
 Recipe = Annotated[
     Path,
@@ -149,7 +149,7 @@ def _print(to: Output, out: Path, report: "StudyReport") -> None:
     from chladni.io.study.tables import SCHEMAS
 
     before = report.there + report.unchanged
-    there = f"; {count(before)} were done already" if before else ""
+    there = f"; {count(before)} {'was' if before == 1 else 'were'} done already" if before else ""
     unread = f", {count(report.unread)} of them couldn't be read" if report.unread else ""
     to.line(f"{counted(report.done, 'log')} done{unread}{there}: {out}")
     if report.failures:
@@ -174,7 +174,8 @@ def _print_trends(to: Output, followed: "Trends", verdict: "Verdict") -> None:
     to.lines([*changes[:MOST_CHANGES], *followed.notes, *verdict.missing])
     if verdict.outside:
         header, rows = _outside(verdict)
-        to.table(f"Outside the band: {len(rows)}, of {counted(verdict.checked, 'check')}", header, rows)
+        told = f"{counted(len(rows), 'value')}, by {counted(verdict.checked, 'check')}"
+        to.table(f"Outside the band: {told}", header, rows)
     elif verdict.checked:
         to.line(f"all within their bands: {counted(verdict.checked, 'check')}")
 

@@ -157,8 +157,8 @@ def test_the_command_ends_with_3_when_something_left_its_band(
     words = ["study", str(recipe), str(log), "--out", str(out), "--html", str(page), "--save", str(recording)]
     assert main(words) == 3
     said = capsys.readouterr().out
-    assert "1 were done already" in said
-    assert "Outside the band: 40" in said
+    assert "1 was done already" in said
+    assert "Outside the band: 40 values" in said
     html = page.read_text()
     assert "Outside the band" in html
     assert "mode 1 (3.994 Hz) changed by" in html
