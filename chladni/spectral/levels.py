@@ -276,6 +276,7 @@ class _Windows:
 
     def numbers(self) -> Iterator[tuple[str, NDArray[Any]]]:
         """Give what stands in the windows, for another's `add_numbers`."""
+        self.join()
         yield from zip(WINDOW_NUMBERS, (np.array([self.samples]), self.number, np.stack(self.moments)), strict=True)
 
     def add_numbers(self, found: Numbers) -> None:
