@@ -69,6 +69,8 @@ def levels(
         _print_severity(out, judged)
     if found.severities and machine is None:
         out.lines(("no zone of severity is told: it needs the machine's class (--machine)",))
+    if not found.severities and machine is not None and not any("no severity" in note for note in found.notes):
+        out.lines(("no severity is told: no channel is in m/s^2 or m/s; state the units in a setup file (--setup)",))
     findings = (*told, *found.notes)
     out.lines(findings)
     out.csv([*found.levels, *found.severities])

@@ -142,3 +142,10 @@ def test_a_channel_that_is_named_is_told_though_it_is_still(run, tmp_path):
 def test_without_the_class_of_the_machine_the_way_to_a_zone_is_told(run, log):
     assert "it needs the machine's class (--machine)" in run("levels", log).out
     assert "it needs the machine's class" not in run("levels", log, "--machine", "large-rigid").out
+
+
+def test_a_machine_without_a_motion_is_told(run, tmp_path):
+    (tmp_path / "a.csv").write_text("time [s],x\n" + "".join(f"{row / 3000},{row % 7}\n" for row in range(3000)))
+    outcome = run("levels", tmp_path / "a.csv", "--machine", "large-rigid")
+    assert outcome.code == 0, outcome.err
+    assert "no severity is told: no channel is in m/s^2 or m/s" in outcome.out.replace("\n", " ")
