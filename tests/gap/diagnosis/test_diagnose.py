@@ -126,7 +126,7 @@ def test_a_body_that_is_too_heavy_carries_something(out: frozenset[str]) -> None
     )
 
 
-@pytest.mark.parametrize("colour", [0.0, pytest.param(0.9, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("colour", [0.0, pytest.param(0.9, marks=pytest.mark.nightly)])
 def test_noise_alone_names_nothing(colour: float) -> None:
     found = diagnose(arm(), [measured(seed=5, colour=colour, seconds=4.0)])
     assert found.verdict == "none"
@@ -165,10 +165,10 @@ def test_two_causes_at_once_are_both_named() -> None:
     assert shares["acc_column"] == pytest.approx(0.03, abs=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @among_few("clipping")
 def test_a_sensor_that_clips_hard_is_named_although_it_looks_noisy(out: frozenset[str]) -> None:
-    log = measured(seconds=3.0, seed=8)
+    log = measured(seconds=5.0, seed=8)
     outputs = log.outputs.copy()
     limit = 1.5 * np.std(outputs[0])
     outputs[0] = np.clip(outputs[0], -limit, limit)
