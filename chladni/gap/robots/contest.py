@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 
 from chladni.gap.calibration import ANOTHER, DETAILS, ELSEWHERE, QUARTER, USUAL
 from chladni.gap.records.diagnosis import PARAMETER
-from chladni.gap.robots.row import Row, columns_of_rows, scaled
+from chladni.gap.robots.row import Row, columns_of_rows
 from chladni.gap.robots.term import FOUND, Term
 from chladni.gap.robots.tolerances import tolerances
 from chladni.gap.robots.torques import RIGHT, Torques
@@ -144,7 +144,7 @@ class Contest:
         }
         self._size = int(starts[-1])
         whole = (np.tensordot(self._told, inside, 1), np.ones(self.within))
-        columns = columns_of_rows(len(torques.missing), [whole, *scaled(self.terms)])
+        columns = columns_of_rows(len(torques.missing), [whole, *((term.columns, term.scale) for term in self.terms)])
         self._rows = tuple(self._row(row, *each) for row, each in enumerate(columns))
         self.count = torques.numbers_a_sample * np.sum(there, axis=1)
         self._energy = np.sum((torques.missing * self._whiten) ** 2, axis=1)
@@ -181,7 +181,7 @@ class Contest:
     def joined(self, term: Term) -> "Contest":
         """Give the contest with one term more, at the same prices."""
         first, count = self._size, len(term.numbers)
-        more = columns_of_rows(len(self._rows), scaled([term]))
+        more = columns_of_rows(len(self._rows), [(term.columns, term.scale)])
         both = tuple(
             self._row(row, np.concatenate([one.numbers, first + numbers]), np.concatenate([one.columns, columns]))
             if numbers.size
@@ -343,7 +343,7 @@ class Contest:
         for row in range(len(found)):
             alone = np.zeros(len(found))
             alone[row] = 1.0
-            _, term = next(one for one in self.promise(fit, alone) if one[1].key not in taken)
+            _, term = next(one for one in self.promise(replace(fit, weight=alone)) if one[1].key not in taken)
             more = self.fit([*fit.terms, term], fit)
             found = [min(least, one.over_noise) for least, one in zip(found, more.left, strict=True)]
         return np.array(found)
@@ -357,11 +357,9 @@ class Contest:
         covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
         return replace(fit, numbers=numbers, covariance=covariance, weight=weight)
 
-    def promise(self, fit: Fit, weight: Real | None = None) -> list[tuple[float, Term]]:
+    def promise(self, fit: Fit) -> list[tuple[float, Term]]:
         """Give what each further term would bring at about, nats, with the rows weighed as in a fit."""
-        if weight is None:
-            weight = fit.weight
-        chosen = self._chosen(fit.terms)
+        weight, chosen = fit.weight, self._chosen(fit.terms)
         gram, rest = np.zeros((self._size, chosen.size)), np.zeros(self._size)
         for row in np.flatnonzero(weight):
             one = self._rows[row]

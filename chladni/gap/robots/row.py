@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.gap.robots.term import Term
 from chladni.signals.arrays import Index, Real
 
 
@@ -74,8 +73,3 @@ def columns_of_rows(rows: int, blocks: Sequence[tuple[Real, Real]]) -> list[tupl
             columns[row].append(block[here, row] * scale[here, None])
         first += len(block)
     return [(np.concatenate(own), np.concatenate(each)) for own, each in zip(numbers, columns, strict=True)]
-
-
-def scaled(terms: Sequence[Term]) -> list[tuple[Real, Real]]:
-    """Give columns and scales of terms."""
-    return [(term.columns, term.scale) for term in terms]

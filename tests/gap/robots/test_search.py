@@ -1,0 +1,85 @@
+"""What a search looks at, and where it ends."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.row import Row, columns_of_rows
+from chladni.gap.robots.search import alternatives, searched
+from chladni.gap.robots.torques import torques_of
+from chladni.robots.machine import Transmission, as_described
+from tests.robots.machines import arm, changed, commands, course, joint_log_of
+
+pytest.importorskip("mujoco")
+
+SECONDS = 12.0
+
+
+@pytest.fixture(scope="module")
+def elastic(tmp_path_factory: pytest.TempPathFactory) -> tuple[Contest, Fit]:
+    """A spring between motor and link of the shoulder, and friction at the elbow."""
+    robot, command = arm(tmp_path_factory.mktemp("arm")), commands(SECONDS)
+    spring = Transmission(stiffness=400.0, gap=0.0, inertia=0.2, logs_motor=False)
+    machine = changed(changed(as_described(robot), 0, transmission=spring), 1, friction=1.0)
+    position = course(machine, command)
+    position += 1e-5 * np.random.default_rng(0).standard_normal(position.shape)
+    contest = Contest(torques_of(robot, joint_log_of(robot, position, command=command)))
+    return contest, searched(contest)
+
+
+def test_both_are_found(elastic: tuple[Contest, Fit]) -> None:
+    _, best = elastic
+    assert {("joint_elasticity", "shoulder"), ("coulomb_friction", "elbow")} <= {one.key for one in best.terms}
+
+
+def test_it_ends_where_nothing_in_place_of_any_term_is_better(elastic: tuple[Contest, Fit]) -> None:
+    contest, best = elastic
+    for place in range(len(best.terms)):
+        # Three are tried in place of each while it searches.
+        assert all(one.nats <= best.nats + 1e-6 for one in alternatives(contest, best, place, 3))
+
+
+def test_words_that_take_most_of_it_are_told_apart_as_what_explains_it_is_weighed(
+    elastic: tuple[Contest, Fit],
+) -> None:
+    contest, best = elastic
+    rest = contest.fit([one for one in best.terms if one.site != "shoulder"], best)
+
+    def lead(fit: Fit) -> float:
+        """Nats by which the spring promises more than the best other word at its joint."""
+        there = [(nats, term.word) for nats, term in contest.promise(fit) if term.site == "shoulder"]
+        return next(nats for nats, word in there if word == "joint_elasticity") - next(
+            nats for nats, word in there if word != "joint_elasticity"
+        )
+
+    assert lead(contest.weighed_as(rest, best.weight)) > 10.0 * lead(rest) > 0.0
+
+
+def test_weights_of_its_own_change_no_number(elastic: tuple[Contest, Fit]) -> None:
+    contest, best = elastic
+    again = contest.weighed_as(best, best.weight)
+    np.testing.assert_allclose(again.numbers, best.numbers, atol=0.05)
+    assert again.nats == best.nats
+
+
+@given(seed=st.integers(0, 2**32 - 1), acting=st.lists(st.booleans(), min_size=2, max_size=8))
+def test_moments_of_a_row_are_those_of_all_its_columns(seed: int, acting: list[bool]) -> None:
+    random = np.random.default_rng(seed)
+    scale = random.uniform(0.5, 2.0, len(acting))
+    # The last row has no columns at all, as those of loops.
+    block = random.standard_normal((len(acting), 2, 16)) * np.array(acting)[:, None, None]
+    whiten, missing = random.uniform(0.5, 2.0, 16), random.standard_normal(16)
+    rows = [Row.of(numbers, columns, whiten, missing) for numbers, columns in columns_of_rows(3, [(block, scale)])]
+    for place, row in enumerate(rows):
+        whole = block[:, place] * scale[:, None] if place < 2 else np.zeros((len(acting), 16))
+        chosen = random.permutation(len(acting))[: max(len(acting) // 2, 1)]
+        places, here = row.held(chosen)
+        gram, right = np.zeros((chosen.size, chosen.size)), np.zeros(chosen.size)
+        gram[np.ix_(places, places)], right[places] = row.gram[np.ix_(here, here)], row.right[here]
+        np.testing.assert_allclose(gram, (whole[chosen] * whiten**2) @ whole[chosen].T, atol=1e-12)
+        np.testing.assert_allclose(right, (whole[chosen] * whiten**2) @ missing, atol=1e-12)
+        few = row.among(chosen)
+        np.testing.assert_array_equal(few.gram, row.gram[np.ix_(here, here)])
+        assert all(np.array_equal(few.column(n), whole[chosen[n]]) for n in few.numbers)
