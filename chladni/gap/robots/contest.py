@@ -35,7 +35,7 @@ class JointLeft:
     energy, count
         Left, and expected of noise alone.
     force
-        Energy that the joint's own laws explain: these idealise a part of it. None without any, infinite for a torque
+        Energy that the joint's own laws and limits of its drive explain: these idealise a part of it. None without any, infinite for a torque
         of any shape.
     """
 
@@ -281,11 +281,11 @@ class Contest:
         return found
 
     def _laws(self, terms: Sequence[Term]) -> list[Index]:
-        """Places among the fitted numbers of each joint's own laws."""
+        """Places among the fitted numbers of what idealises a part: a joint's laws, and what its drive doesn't give."""
         found: list[list[int]] = [[] for _ in self.torques.missing]
         place = self.within
         for term in terms:
-            for row in term.rows:
+            for row in self.rows(term) if term.takes else term.rows:
                 found[row] += range(place, place + len(term.numbers))
             place += len(term.numbers)
         return [np.array(one, dtype=np.intp) for one in found]
