@@ -194,7 +194,9 @@ def _designs(contest: Contest, doubt: Doubt) -> list[tuple[Motion, Design]]:
 def _motions(torques: Torques, doubt: Doubt) -> Iterator[Motion]:
     """As usual, at other speeds, over another way, from another pose, and with a load; joints alone before all."""
     robot = torques.robot
-    alone = [_alone(torques.joints[row]) for row in doubt.rows]
+    # Rows of loops lie behind those of the joints.
+    joints = dict.fromkeys(row % len(torques.joints) for row in doubt.rows)
+    alone = [_alone(torques.joints[joint]) for joint in joints]
     yield from (one[0] for one in alone)
     yield Motion(words="move all joints")
     yield from (motion for one in alone for motion in one[1:])

@@ -12,13 +12,14 @@ from scipy.signal import sawtooth
 
 import chladni
 from chladni.cli.main import main
-from chladni.gap.records.diagnosis import Diagnosis
+from chladni.gap.records.diagnosis import Candidate, Diagnosis
 from chladni.gap.robots.contest import Contest
 from chladni.gap.robots.diagnose import diagnose_robot
 from chladni.gap.robots.next_measurement import Motion, _log_of, next_measurement
 from chladni.gap.robots.torques import torques_of
 from chladni.robots.loading import load_robot
 from chladni.robots.robot import Robot
+from tests.gap.robots.test_diagnose import efforts
 from tests.robots.machines import ARM, AS_DESCRIBED, RATE_HZ, arm, commands, joint_log_of, run_native
 
 pytest.importorskip("mujoco")
@@ -123,3 +124,16 @@ def test_where_no_word_explains_it_the_joint_is_moved_alone(tmp_path: Path, monk
     assert np.ptp(moved[0]) == 0.0
     assert np.ptp(moved[1]) > 0.05
     assert next_measurement(contest, contest.nothing, (), ()) is None
+
+
+def test_play_between_a_drive_and_its_joint_moves_that_joint(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), at_one_speed(6.0, amplitude=0.5)
+    position = run_native(robot, command)
+    # Where commands and efforts are logged, loops have rows of their own behind those of the joints.
+    log = joint_log_of(robot, position, command=command, effort=efforts(command, position))
+    contest = Contest(torques_of(robot, log))
+    play = next(term for term in contest.terms if term.word == "backlash" and term.rows == (1, 3))
+    named = [(0, Candidate(effect=play.word, site=play.site), 1.0)]
+    said = next_measurement(contest, contest.fit([play]), named, ()) or ""
+    assert "backlash at elbow" in said
+    assert "move elbow alone" in said
