@@ -46,7 +46,7 @@ _GAP = 1.5
 _SIGMAS = 2.0
 #: Times the noise from which an error is clear of it.
 _CLEAR = 2.0
-#: Of the error without: what is left by an answer that takes the place of one that was denied.
+#: Of the error without: what an answer leaves that simulation confirms.
 _HALF = 0.5
 #: Of its share where it acts most: joints with less don't tell of it.
 _ACTS = 0.1
@@ -86,15 +86,15 @@ class Answer:
 
     @cached_property
     def to_leave_out(self) -> frozenset[str]:
-        """What a simulation denies first, as ``word@site``: what else explains those torques may follow it."""
-        if self.denied is None:
+        """What simulation confirms least, as ``word@site``: others that fit those torques may follow the motion."""
+        if not self._suggested or self._simulated is None or self.is_confirmed():
             return frozenset()
-        left = _without_worst(self._suggested, self.denied, self.solved.torques)
+        left = _without_worst(self._suggested, self._simulated, self.solved.torques)
         return frozenset(f"{one.term.word}@{one.term.site}" for one in self._suggested if one not in left)
 
     def is_confirmed(self) -> bool:
         """Whether simulation takes more than half of the error away."""
-        found = self._confirmed[1]
+        found = self._simulated
         return bool(self.named) and found is not None and found.after < _HALF * found.tuned
 
     @property

@@ -35,8 +35,8 @@ class JointLeft:
     energy, count
         Left, and expected of noise alone.
     force
-        Energy that the joint's own laws and limits of its drive explain: these idealise a part of it. None without any, infinite for a torque
-        of any shape.
+        Energy that the joint's own laws and limits of its drive explain: these idealise a part of it. None without
+        any, infinite for a torque of any shape.
     """
 
     energy: float
@@ -281,7 +281,7 @@ class Contest:
         return found
 
     def _laws(self, terms: Sequence[Term]) -> list[Index]:
-        """Places among the fitted numbers of what idealises a part: a joint's laws, and what its drive doesn't give."""
+        """Places among the fitted numbers of what idealises: a joint's laws, and what its drive doesn't give."""
         found: list[list[int]] = [[] for _ in self.torques.missing]
         place = self.within
         for term in terms:
