@@ -164,7 +164,8 @@ class Contest:
     def _with(self, **parts: object) -> "Contest":
         """Give the same at the same prices, but for these parts."""
         other = copy(self)
-        vars(other).pop("_alike", None)
+        for made in ("_alike", "_acting"):
+            vars(other).pop(made, None)
         vars(other).update(parts)
         return other
 
@@ -300,7 +301,7 @@ class Contest:
         for term in terms:
             if term.takes:
                 first = self._places[id(term)][0]
-                for row in self._acting(first):
+                for row in self._acting[first]:
                     taken[row] = taken.get(row, 0.0) + numbers[place] * self._rows[row].column(first)
             place += len(term.numbers)
         found = np.ones(len(self._energy))
@@ -319,7 +320,7 @@ class Contest:
         for term in terms:
             if term.over_gain:
                 over = float(term.nominal[0] + numbers[place] * term.scale[0])
-                found[self._acting(self._places[id(term)][0])] *= min(over, 1.0) ** 2
+                found[self._acting[self._places[id(term)][0]]] *= min(over, 1.0) ** 2
             place += len(term.numbers)
         return found
 
@@ -418,11 +419,16 @@ class Contest:
 
     def rows(self, term: Term) -> frozenset[int]:
         """Give the rows at which a term acts."""
-        return frozenset(row for number in self._places[id(term)] for row in self._acting(int(number)))
+        return frozenset(row for number in self._places[id(term)] for row in self._acting[number])
 
-    def _acting(self, number: int) -> list[int]:
-        """Give the rows at which a number acts."""
-        return [row for row, one in enumerate(self._rows) if one.held(np.array([number]))[0].size]
+    @cached_property
+    def _acting(self) -> list[list[int]]:
+        """Rows at which each number acts."""
+        found: list[list[int]] = [[] for _ in range(self._size)]
+        for row, one in enumerate(self._rows):
+            for number in one.numbers:
+                found[number].append(row)
+        return found
 
     def _chosen(self, terms: Sequence[Term]) -> Index:
         return np.concatenate([np.arange(self.within), *(self._places[id(term)] for term in terms)])
