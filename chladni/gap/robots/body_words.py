@@ -1,6 +1,7 @@
 """Words of links, of readings and of the world; and what tolerances allow for."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -27,28 +28,35 @@ def readings(torques: Torques) -> Iterator[Term]:
     """Encoders whose zero is elsewhere."""
     number = Number(name="offset", unit="rad", scale=_READING)
     for row, joint in torques.rows:
-        columns = torques.offset(row)[None]
-        yield Term(word="encoder_offset", site=joint.name, columns=columns, numbers=(number,), variant=OF_THE_LOG)
+        make = partial(_offset, torques, row)
+        yield Term(word="encoder_offset", site=joint.name, make=make, numbers=(number,), variant=OF_THE_LOG)
         if (torques.two_sided or not torques.by_effort) and torques.kp[row] > 0:
-            columns = at_row(torques, torques.servo_row(row), np.full(torques.missing.shape[1], torques.kp[row]))
-            yield Term(
-                word="encoder_offset", site=joint.name, columns=columns, numbers=(number,), variant="of the drive"
-            )
+            pulled = np.full(torques.missing.shape[1], torques.kp[row])
+            make = partial(at_row, torques, torques.servo_row(row), pulled)
+            yield Term(word="encoder_offset", site=joint.name, make=make, numbers=(number,), variant="of the drive")
+
+
+def _offset(torques: Torques, row: int) -> Real:
+    return torques.offset(row)[None]
 
 
 def bodies(torques: Torques) -> Iterator[Term]:
     """Tilt, and wrong masses."""
     angles = tuple(Number(name=name, unit="rad", scale=_TILT) for name in ("about_x", "about_y", "about_z"))
     if torques.base is None:
-        yield Term(word="gravity_tilt", site=WORLD, columns=torques.tilt, numbers=angles[:2])
+        yield Term(word="gravity_tilt", site=WORLD, make=lambda: torques.tilt, numbers=angles[:2])
     elif torques.log.imu is not None:
         # Which way is down an IMU tells.
-        yield Term(word="misalignment", site=torques.log.imu.site, columns=torques.turned_imu, numbers=angles)
+        yield Term(word="misalignment", site=torques.log.imu.site, make=lambda: torques.turned_imu, numbers=angles)
     mass = Number(name="mass", unit="1", scale=_MASS, least=-1.0)
     for name, own, columns in _links(torques):
         if own[0] > 0:
-            whole = np.einsum("p,pjk->jk", own, columns)
-            yield Term(word=PARAMETER, site=f"{name}.mass", columns=whole[None], numbers=(mass,))
+            make = partial(_of_whole, own, columns)
+            yield Term(word=PARAMETER, site=f"{name}.mass", make=make, numbers=(mass,))
+
+
+def _of_whole(own: Real, columns: Real) -> Real:
+    return np.asarray(np.einsum("p,pjk->jk", own, columns)[None])
 
 
 def payloads(torques: Torques) -> Iterator[Term]:
@@ -63,10 +71,14 @@ def payloads(torques: Torques) -> Iterator[Term]:
     for name, _, columns in _links(torques):
         # What is fixed to a link moves as one with it: a payload on it is one on the link.
         if name in moved:
-            around = _slopes_of_point(torques.guesses.centre_m.get(name, np.zeros(3)))
-            point = columns[:4] + np.tensordot(around, columns[4:], 1)
-            whole = np.concatenate([point, np.sum(columns[4:7], axis=0, keepdims=True)])
-            yield Term(word="payload", site=name, columns=whole, numbers=load, reach=_FAR * _REACH_M)
+            make = partial(_of_ball, columns, torques.guesses.centre_m.get(name, np.zeros(3)))
+            yield Term(word="payload", site=name, make=make, numbers=load, reach=_FAR * _REACH_M)
+
+
+def _of_ball(columns: Real, centre_m: Real) -> Real:
+    """``[5, row, coarse]``: of a mass, its three moments and the inertia about its centre."""
+    point = columns[:4] + np.tensordot(_slopes_of_point(centre_m), columns[4:], 1)
+    return np.concatenate([point, np.sum(columns[4:7], axis=0, keepdims=True)])
 
 
 def _links(torques: Torques) -> Iterator[tuple[str, Real, Real]]:

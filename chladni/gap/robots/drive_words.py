@@ -1,6 +1,7 @@
 """Words of drives: gains, delays, lags, limits, dead zones."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -25,10 +26,9 @@ def drives(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.told_rows:
         # In units of what was asked the motion needs 1/gain times its torque: so no gain explains all by being small.
         over = Number(name="over_gain", unit="1", scale=_GAIN, least=LEAST_OVER - 1.0, nominal=1.0)
-        columns = at_row(
-            torques, _limited(torques, row), (torques.answered if torques.gives else torques.wanted)[row]
-        )
-        yield Term(word="gain_error", site=joint.name, columns=columns, numbers=(over,), over_gain=True)
+        answered = (torques.answered if torques.gives else torques.wanted)[row]
+        make = partial(at_row, torques, _limited(torques, row), answered)
+        yield Term(word="gain_error", site=joint.name, make=make, numbers=(over,), over_gain=True)
         if not torques.by_effort or torques.gives or torques.log.effort_kind != "measured":
             yield from _saturation(torques, row, joint)
             yield from _dead_zone(torques, row, joint)
@@ -43,14 +43,16 @@ def _limited(torques: Torques, row: int) -> int:
 
 def _loops(torques: Torques) -> Iterator[Term]:
     for row, joint in torques.told_rows:
-        lagging = torques.smooth(np.gradient(torques.fast_drive[row], 1.0 / torques.log.sample_rate_hz))
         lag = Number(name="time_constant", unit="s", scale=_LAG_S, least=0.0)
-        yield Term(
-            word="lag", site=joint.name, columns=at_row(torques, torques.servo_row(row), lagging), numbers=(lag,)
-        )
+        yield Term(word="lag", site=joint.name, make=partial(_lagging, torques, row), numbers=(lag,))
         yield from _rate_limit(torques, row, joint)
     if torques.log.command_kind == "position":
         yield from _gains(torques)
+
+
+def _lagging(torques: Torques, row: int) -> Real:
+    rate = torques.smooth(np.gradient(torques.fast_drive[row], 1.0 / torques.log.sample_rate_hz))
+    return at_row(torques, torques.servo_row(row), rate)
 
 
 def _part() -> Number:
@@ -62,8 +64,7 @@ def _saturation(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]
     asked = torques.fast_asked[row]
 
     def make(limit: float) -> Term:
-        cut = torques.smooth(asked - np.clip(asked, -limit, limit))
-        return _of_drive(torques, _limited(torques, row), "saturation", cut)
+        return _of_drive(torques, _limited(torques, row), "saturation", lambda: asked - np.clip(asked, -limit, limit))
 
     yield from _limits(make, np.quantile(np.abs(asked), _LIMITS), "limit", units(joint)[0])
 
@@ -72,7 +73,7 @@ def _dead_zone(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
     asked = torques.fast_asked[row]
 
     def make(width: float) -> Term:
-        return _of_drive(torques, _limited(torques, row), "dead_zone", torques.smooth(np.clip(asked, -width, width)))
+        return _of_drive(torques, _limited(torques, row), "dead_zone", lambda: np.clip(asked, -width, width))
 
     yield from _limits(make, np.quantile(np.abs(asked), _WIDTHS), "width", units(joint)[0])
 
@@ -89,10 +90,13 @@ def _rate_limit(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]
         return
 
     def make(rate: float) -> Term:
-        behind = np.zeros_like(command)
-        for a, b in torques.stretches:
-            behind[a:b] = command[a:b] - followed(command[a:b], rate / torques.log.sample_rate_hz)
-        return _of_drive(torques, torques.servo_row(row), "rate_limit", torques.kp[row] * torques.smooth(behind))
+        def not_given() -> Real:
+            behind = np.zeros_like(command)
+            for a, b in torques.stretches:
+                behind[a:b] = command[a:b] - followed(command[a:b], rate / torques.log.sample_rate_hz)
+            return np.asarray(torques.kp[row] * behind)
+
+        return _of_drive(torques, torques.servo_row(row), "rate_limit", not_given)
 
     unit = "rad/s" if joint.kind == "hinge" else "m/s"
     yield from _limits(make, np.quantile(smooth, _LIMITS), "rate", unit)
@@ -104,10 +108,12 @@ def _limits(make: Callable[[float], Term], grid: Real, name: str, unit: str) -> 
         yield from formed(make, grid, name=name, unit=unit)
 
 
-def _of_drive(torques: Torques, row: int, word: str, column: Real) -> Term:
-    columns = at_row(torques, row, column)
-    site = torques.joints[row % len(torques.joints)].name
-    return Term(word=word, site=site, columns=columns, numbers=(_part(),), takes=True, rare=word != "saturation")
+def _of_drive(torques: Torques, row: int, word: str, not_given: Callable[[], Real]) -> Term:
+    """Give the law of a drive that doesn't give ``[sample]`` of what it's asked for."""
+    return Term(
+        word=word, site=torques.joints[row % len(torques.joints)].name, numbers=(_part(),), takes=True,
+        make=lambda: at_row(torques, row, torques.smooth(not_given())), rare=word != "saturation",
+    )  # fmt: skip
 
 
 def _gains(torques: Torques) -> Iterator[Term]:
@@ -115,7 +121,7 @@ def _gains(torques: Torques) -> Iterator[Term]:
         damped = torques.damped[row]
         yield Term(
             word="controller_gain", site=joint.name,
-            columns=at_row(torques, torques.servo_row(row), torques.answered[row] + damped, damped),
+            make=partial(at_row, torques, torques.servo_row(row), torques.answered[row] + damped, damped),
             numbers=(
                 Number(name="over_kp", unit="1", scale=_GAIN, least=LEAST_OVER - 1.0, nominal=1.0),
                 Number(name="kd_over_kp", unit="1", scale=_GAIN),
@@ -136,13 +142,16 @@ def delays(torques: Torques) -> Iterator[Term]:
         own = Number(name="delay", unit="s", scale=_DELAY_S, least=max(least, -believed - common))
         variant = None if secant_s is None else f"over {secant_s:g} s"
         late = torques.late(0.0, common if secant_s is None else secant_s)
-        yield Term(
-            word="delay", site=ALL_COMMANDS, columns=torques.at_servos(late)[None], numbers=(delay,), variant=variant
-        )
+        make = partial(_at_all_servos, torques, late)
+        yield Term(word="delay", site=ALL_COMMANDS, make=make, numbers=(delay,), variant=variant)
         late = torques.late(common, 0.0 if secant_s is None else secant_s)
         for row, joint in torques.rows:
             found = torques.guesses.late_s.get(joint.name, 0.0)
             alone = torques.late(common, found)[row] if secant_s is None and found else late[row]
-            columns = at_row(torques, torques.servo_row(row), alone)
+            make = partial(at_row, torques, torques.servo_row(row), alone)
             # One line carries the commands of all.
-            yield Term(word="delay", site=joint.name, columns=columns, numbers=(own,), variant=variant, rare=True)
+            yield Term(word="delay", site=joint.name, make=make, numbers=(own,), variant=variant, rare=True)
+
+
+def _at_all_servos(torques: Torques, column: Real) -> Real:
+    return torques.at_servos(column)[None]

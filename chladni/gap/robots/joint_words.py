@@ -32,26 +32,28 @@ _MOST_WAVES = 128
 def friction(torques: Torques) -> Iterator[Term]:
     """Friction of single joints."""
     for row, joint in torques.rows:
-        often, speed = usual(torques, row), rms(torques.velocity[row])
-        force, damping, _ = units(joint)
-        sign, fast = torques.sign[row], torques.fast_velocity[row]
         dry = _dry(torques, row, joint)
-        one = partial(law, torques, row)
-        yield one("coulomb_friction", (sign,), dry)
-        wet = Number(
-            name="coefficient", unit=damping, scale=often / speed, least=-joint.damping, nominal=joint.damping
-        )
-        yield one("viscous_friction", (torques.velocity[row],), wet)
-        unit = f"{force} s^2/rad^2" if joint.kind == "hinge" else "N s^2/m^2"
-        square = Number(name="coefficient", unit=unit, scale=often / speed**2, least=0.0)
-        yield one("quadratic_damping", (torques.smooth(fast * np.abs(fast)),), square)
-        # What the drive gives holds the friction itself: the load is what the motion needs.
-        carried = _load(torques, row) * sign
         by_load = Number(name="coefficient", unit="1", scale=_BY_LOAD, least=0.0)
-        yield one("load_friction", (sign, carried), dry, by_load, plainer="coulomb_friction")
+        yield from _plain(torques, row, joint, dry, by_load)
         yield _uneven(torques, row, dry)
         yield from _stribeck(torques, row, joint, torques.fast_sign[row])
         yield from _loops(torques, row, joint, dry, by_load)
+
+
+def _plain(torques: Torques, row: int, joint: RobotJoint, dry: Number, by_load: Number) -> Iterator[Term]:
+    """Friction by the speed and the load of the moment."""
+    often, speed = usual(torques, row), rms(torques.velocity[row])
+    force, damping, _ = units(joint)
+    sign, fast = torques.sign[row], torques.fast_velocity[row]
+    one = partial(law, torques, row)
+    yield one("coulomb_friction", lambda: (sign,), dry)
+    wet = Number(name="coefficient", unit=damping, scale=often / speed, least=-joint.damping, nominal=joint.damping)
+    yield one("viscous_friction", lambda: (torques.velocity[row],), wet)
+    unit = f"{force} s^2/rad^2" if joint.kind == "hinge" else "N s^2/m^2"
+    square = Number(name="coefficient", unit=unit, scale=often / speed**2, least=0.0)
+    yield one("quadratic_damping", lambda: (torques.smooth(fast * np.abs(fast)),), square)
+    # What the drive gives holds the friction itself: the load is what the motion needs.
+    yield one("load_friction", lambda: (sign, _load(torques, row) * sign), dry, by_load, plainer="coulomb_friction")
 
 
 def bristles(torques: Torques) -> Iterator[Term]:
@@ -72,12 +74,13 @@ def _dry(torques: Torques, row: int, joint: RobotJoint) -> Number:
 def _uneven(torques: Torques, row: int, dry: Number) -> Term:
     """Friction that changes along a joint's way, as that of knees behind linkages: by places it's linear between."""
     fast, places = torques.fast_position[row], way_of(torques, row)
-    midway, lowest, highest = (
-        torques.smooth(torques.fast_sign[row] * np.interp(fast, places, there))
-        for there in np.eye(len(places))[[1, 0, 2]]
-    )
+
+    def midway_lowest_highest() -> tuple[Real, ...]:
+        shapes = np.eye(len(places))[[1, 0, 2]]
+        return tuple(torques.smooth(torques.fast_sign[row] * np.interp(fast, places, one)) for one in shapes)
+
     return law(
-        torques, row, "coulomb_friction", (midway, lowest, highest), dry, replace(dry, name="at_lowest"),
+        torques, row, "coulomb_friction", midway_lowest_highest, dry, replace(dry, name="at_lowest"),
         replace(dry, name="at_highest"), variant=ALONG_THE_WAY, rare=True,
     )  # fmt: skip
 
@@ -93,10 +96,11 @@ def _stribeck(torques: Torques, row: int, joint: RobotJoint, sign: Real, variant
     fast, unit = torques.fast_velocity[row], "rad/s" if joint.kind == "hinge" else "m/s"
     dry = _dry(torques, row, joint)
     rise = Number(name="rise", unit=dry.unit, scale=dry.scale, least=0.0)
-    constant = torques.smooth(sign)
 
     def make(speed: float) -> Term:
-        columns = (constant, torques.smooth(sign * np.exp(-((fast / speed) ** 2))))
+        def columns() -> tuple[Real, ...]:
+            return torques.smooth(sign), torques.smooth(sign * np.exp(-((fast / speed) ** 2)))
+
         return law(torques, row, "stribeck_friction", columns, dry, rise, variant=variant, plainer="coulomb_friction")
 
     grid = np.array(_STRIBECK) * rms(torques.velocity[row])
@@ -114,7 +118,7 @@ def _motion(torques: Torques, row: int) -> float:
 
 def _loops(torques: Torques, row: int, joint: RobotJoint, dry: Number, by_load: Number) -> Iterator[Term]:
     """Dahl's loop: friction that builds up over a way (Dahl 1968), a short one where a joint slides."""
-    loop, load = replace(dry, least=0.0, nominal=0.0), _load(torques, row)
+    loop = replace(dry, least=0.0, nominal=0.0)
     for word, shares, numbers, variant in (
         ("coulomb_friction", _SLIDES, (dry,), PRESLIDING),
         ("load_friction", _SLIDES, (dry, by_load), PRESLIDING),
@@ -124,9 +128,11 @@ def _loops(torques: Torques, row: int, joint: RobotJoint, dry: Number, by_load: 
         def make(
             yields: float, word: str = word, numbers: tuple[Number, ...] = numbers, variant: str | None = variant
         ) -> Term:
-            built_up = torques.smooth(_dahl(torques.fast_position[row], yields, torques.stretches))
-            columns = (built_up, load * built_up)[: len(numbers)]
-            plainer = "coulomb_friction" if len(columns) > 1 else None
+            def columns() -> tuple[Real, ...]:
+                built_up = torques.smooth(_dahl(torques.fast_position[row], yields, torques.stretches))
+                return (built_up, _load(torques, row) * built_up)[: len(numbers)]
+
+            plainer = "coulomb_friction" if len(numbers) > 1 else None
             return law(torques, row, word, columns, *numbers, variant=variant, rare=variant is None, plainer=plainer)
 
         yield from formed(make, np.array(shares) * _motion(torques, row), name="yield", unit=length(joint))
@@ -163,11 +169,15 @@ def coupled(torques: Torques) -> Iterator[Term]:
             dry = Number(name="force", unit="N m", scale=often, least=0.0)
             wet = Number(name="coefficient", unit="N m s/rad", scale=often / rms(smooth), least=0.0)
             for word, column, number in (("coulomb_friction", sign, dry), ("viscous_friction", smooth, wet)):
-                columns = at_row(torques, row, column) + sense * at_row(torques, row + 1, column)
                 yield Term(
-                    word=word, site=f"{one.name}~{other.name}", columns=columns, numbers=(number,),
+                    word=word, site=f"{one.name}~{other.name}", numbers=(number,),
+                    make=partial(_at_both, torques, row, column, sense),
                     rows=(row, row + 1), variant=variant, rare=True,
                 )  # fmt: skip
+
+
+def _at_both(torques: Torques, row: int, column: Real, sense: float) -> Real:
+    return np.asarray(at_row(torques, row, column) + sense * at_row(torques, row + 1, column))
 
 
 def springs(torques: Torques) -> Iterator[Term]:
@@ -178,10 +188,13 @@ def springs(torques: Torques) -> Iterator[Term]:
         force, _, stiffness = units(joint)
         pull = Number(name="stiffness", unit=stiffness, scale=often / travel, least=0.0)
         constant = Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel))
-        columns = (torques.position[row], np.ones_like(torques.position[row]))
-        yield law(torques, row, "joint_spring", columns, pull, constant)
+        yield law(torques, row, "joint_spring", partial(_line, torques.position[row]), pull, constant)
         for side in (1.0, -1.0):
             yield from _stop(torques, row, joint, side, pull)
+
+
+def _line(position: Real) -> tuple[Real, ...]:
+    return position, np.ones_like(position)
 
 
 def _stop(torques: Torques, row: int, joint: RobotJoint, side: float, pull: Number) -> list[Term]:
@@ -189,8 +202,10 @@ def _stop(torques: Torques, row: int, joint: RobotJoint, side: float, pull: Numb
     variant = "above" if side > 0 else "below"
 
     def make(clearance: float) -> Term:
-        pressed = torques.smooth(side * np.maximum(way - clearance, 0.0))
-        return law(torques, row, "one_sided_stop", (pressed,), pull, variant=variant, rare=True)
+        def pressed() -> tuple[Real, ...]:
+            return (torques.smooth(side * np.maximum(way - clearance, 0.0)),)
+
+        return law(torques, row, "one_sided_stop", pressed, pull, variant=variant, rare=True)
 
     grid = np.quantile(side * torques.position[row], _STOPS)
     if np.any(np.diff(grid) <= 0):
@@ -205,8 +220,8 @@ def inertia(torques: Torques) -> Iterator[Term]:
             name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", least=-joint.armature,
             nominal=joint.armature, scale=usual(torques, row) / rms(torques.acceleration[row]),
         )  # fmt: skip
-        columns = at_row(torques, row, torques.acceleration[row])
-        yield Term(word="armature", site=joint.name, columns=columns, numbers=(number,))
+        make = partial(at_row, torques, row, torques.acceleration[row])
+        yield Term(word="armature", site=joint.name, make=make, numbers=(number,))
 
 
 def ripple(torques: Torques) -> Iterator[Term]:
@@ -217,9 +232,11 @@ def ripple(torques: Torques) -> Iterator[Term]:
         number = partial(Number, unit=units(joint)[0], scale=usual(torques, row))
 
         def make(period: float, row: int = row, position: Real = position, number: partial[Number] = number) -> Term:
-            turns = 2.0 * np.pi / period * position
-            columns = (torques.smooth(np.sin(turns)), torques.smooth(np.cos(turns)))
-            return law(torques, row, "ripple", columns, number(name="sine"), number(name="cosine"), rare=True)
+            def waves() -> tuple[Real, ...]:
+                turns = 2.0 * np.pi / period * position
+                return torques.smooth(np.sin(turns)), torques.smooth(np.cos(turns))
+
+            return law(torques, row, "ripple", waves, number(name="sine"), number(name="cosine"), rare=True)
 
         way = float(np.ptp(torques.position[row]))
         for place, period in enumerate(periods):

@@ -244,8 +244,7 @@ def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
             if term.form is not None
         }
         laid = _laid(torques, robot, _log_of(torques, made), forms)
-        words = {term.word for fit in (doubt.one, doubt.other) for term in fit.terms}
-        left_out = frozenset({*ROBOT_WORDS, PARAMETER}) - words
+        left_out = _left_out(contest, doubt)
         here = all_terms(laid, left_out)
         ahead = [
             _ahead(
@@ -256,6 +255,15 @@ def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
     except (ChladniError, KeyError):
         return None
     return max(min(ahead), 0.0)
+
+
+def _left_out(contest: Contest, doubt: Doubt) -> frozenset[str]:
+    """Give all but the terms of both sets, and the words that they differ in at every site."""
+    keys = {term.key for fit in (doubt.one, doubt.other) for term in fit.terms}
+    words = {word for word, _ in keys}
+    differ = {term.word for term in doubt.terms if term is not None}
+    elsewhere = {f"{one.word}@{one.site}" for one in contest.terms if one.word not in differ and one.key not in keys}
+    return (frozenset({*ROBOT_WORDS, PARAMETER}) - words) | elsewhere
 
 
 def _laid(torques: Torques, robot: Robot, log: JointLog, forms: Mapping[FormKey, float]) -> Torques:

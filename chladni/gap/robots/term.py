@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -83,8 +84,8 @@ class Term:
     ----------
     word, site, variant
         What, where, and which kind of it.
-    columns
-        ``[number, row, coarse]``: missing torque a unit of each number; rows of the loops may be left out.
+    make
+        Gives the columns.
     numbers
         One a column.
     rows
@@ -105,7 +106,7 @@ class Term:
 
     word: str
     site: str
-    columns: Real
+    make: Callable[[], Real]
     numbers: tuple[Number, ...]
     rows: tuple[int, ...] = ()
     variant: str | None = None
@@ -115,6 +116,14 @@ class Term:
     takes: bool = False
     over_gain: bool = False
     rare: bool = False
+
+    @cached_property
+    def columns(self) -> Real:
+        """``[number, row, coarse]``: missing torque a unit of each number; rows of the loops may be left out.
+
+        Made when they're asked for: most words don't take part where a motion is laid out.
+        """
+        return self.make()
 
     @property
     def key(self) -> tuple[str, str]:
@@ -196,11 +205,11 @@ def length(joint: RobotJoint) -> str:
 
 
 def law(
-    torques: Torques, row: int, word: str, columns: tuple[Real, ...], *numbers: Number, variant: str | None = None,
-    rare: bool = False, plainer: str | None = None,
+    torques: Torques, row: int, word: str, make: Callable[[], tuple[Real, ...]], *numbers: Number,
+    variant: str | None = None, rare: bool = False, plainer: str | None = None,
 ) -> Term:  # fmt: skip
-    """Give a law of one joint."""
+    """Give a law of one joint; `make` gives its columns there."""
     return Term(
-        word=word, site=torques.joints[row].name, columns=at_row(torques, row, *columns), numbers=numbers,
+        word=word, site=torques.joints[row].name, make=lambda: at_row(torques, row, *make()), numbers=numbers,
         rows=(row,), variant=variant, rare=rare, plainer=plainer,
     )  # fmt: skip

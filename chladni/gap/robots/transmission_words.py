@@ -6,6 +6,7 @@ Dynamic Systems, Measurement, and Control 109 (1987) 310).
 """
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -62,27 +63,36 @@ def _rotor(torques: Torques, row: int, joint: RobotJoint) -> Number:
 
 def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Real, number: Number) -> Iterator[Term]:
     """Give the law for either side that the log may read; `ahead` is the motor's lead a unit of the number."""
-    rate, acceleration = torques.coarse_rate(ahead), torques.coarse_rate(torques.coarse_rate(ahead))
     rotor = _rotor(torques, row, joint)
     both = Number(name="both", unit="1", scale=number.scale * rotor.scale, least=0.0)
-    columns = at_row(torques, row, torques.acceleration[row], acceleration)
     numbers: tuple[Number, ...] = (rotor, both)
     rows = tuple(dict.fromkeys([row, torques.servo_row(row)]))
     known = _loop_is_known(torques, row)
     if known:
-        # The loop works on the motor's angle.
-        loop = torques.kp[row] * ahead + torques.kd[row] * rate
-        columns = np.concatenate([at_row(torques, torques.servo_row(row), loop), columns])
         numbers = (number, *numbers)
     if known or torques.by_effort:
-        yield Term(
-            word=word, site=joint.name, columns=columns, numbers=numbers, rows=rows, variant=AT_LINK, rare=True
-        )
-    behind = torques.turned(row, -ahead, -rate, -acceleration)
-    whole = np.concatenate([behind[None], at_row(torques, row, torques.acceleration[row])[:, : len(behind)]])
+        make = partial(_at_link, torques, row, ahead, loop_is_known=known)
+        yield Term(word=word, site=joint.name, make=make, numbers=numbers, rows=rows, variant=AT_LINK, rare=True)
     yield Term(
-        word=word, site=joint.name, columns=whole, numbers=(number, rotor), rows=(row,), variant=AT_MOTOR, rare=True
-    )
+        word=word, site=joint.name, make=partial(_at_motor, torques, row, ahead), numbers=(number, rotor),
+        rows=(row,), variant=AT_MOTOR, rare=True,
+    )  # fmt: skip
+
+
+def _at_link(torques: Torques, row: int, ahead: Real, *, loop_is_known: bool) -> Real:
+    rate = torques.coarse_rate(ahead)
+    columns = at_row(torques, row, torques.acceleration[row], torques.coarse_rate(rate))
+    if not loop_is_known:
+        return columns
+    # The loop works on the motor's angle.
+    loop = torques.kp[row] * ahead + torques.kd[row] * rate
+    return np.concatenate([at_row(torques, torques.servo_row(row), loop), columns])
+
+
+def _at_motor(torques: Torques, row: int, ahead: Real) -> Real:
+    rate = torques.coarse_rate(ahead)
+    behind = torques.turned(row, -ahead, -rate, -torques.coarse_rate(rate))
+    return np.concatenate([behind[None], at_row(torques, row, torques.acceleration[row])[:, : len(behind)]])
 
 
 def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
@@ -94,20 +104,16 @@ def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
     rotor = _rotor(torques, row, joint)
 
     def make(gap: float) -> Term:
-        ahead = _inside(asked, 0.5 * gap, kp, kd, step_s)
-        pulled = torques.smooth(kp * ahead + kd * np.gradient(ahead, step_s))
-        turning = torques.acceleration[row] + torques.coarse_rate(torques.coarse_rate(torques.smooth(ahead)))
-        columns = np.concatenate([at_row(torques, torques.servo_row(row), pulled), at_row(torques, row, turning)])
+        def columns() -> Real:
+            ahead = _inside(asked, 0.5 * gap, kp, kd, step_s)
+            pulled = torques.smooth(kp * ahead + kd * np.gradient(ahead, step_s))
+            turning = torques.acceleration[row] + torques.coarse_rate(torques.coarse_rate(torques.smooth(ahead)))
+            return np.concatenate([at_row(torques, torques.servo_row(row), pulled), at_row(torques, row, turning)])
+
         return Term(
-            word="backlash",
-            site=joint.name,
-            columns=columns,
-            numbers=(part, rotor),
-            rows=rows,
-            variant=AT_LINK,
-            takes=True,
-            rare=True,
-        )
+            word="backlash", site=joint.name, make=columns, numbers=(part, rotor), rows=rows, variant=AT_LINK,
+            takes=True, rare=True,
+        )  # fmt: skip
 
     grid = 2.0 * np.quantile(np.abs(asked), _PLAYS) / kp
     if grid[0] > 0 and np.all(np.diff(grid) > 0):
