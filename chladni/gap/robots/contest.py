@@ -151,6 +151,7 @@ class Contest:
         self._start = 1.0 / (1.0 + np.maximum(self._energy - self.count, 0.0) / np.maximum(self.count, 1.0))
         bounds = [term.least / term.scale for term in self.terms]
         self._least = np.concatenate([np.full(self.within, -np.inf), *bounds])
+        self._mean = np.concatenate([np.zeros(self.within), *(term.about / term.scale for term in self.terms)])
         kinds = {(term.key, term.rare): term for term in self.terms}
         self._words, self._every = Counter((term.word, term.rare) for term in kinds.values()), log(max(len(kinds), 1))
         # What tolerances alone leave.
@@ -175,7 +176,7 @@ class Contest:
         counts = np.cumsum([self.within, *(len(term.scale) for term in terms)])
         return self._with(
             terms=list(terms), _rows=tuple(one.among(chosen) for one in self._rows), _size=chosen.size,
-            _least=self._least[chosen],
+            _least=self._least[chosen], _mean=self._mean[chosen],
             _places={id(term): np.arange(a, a + len(term.scale)) for term, a in zip(terms, counts, strict=False)},
         )  # fmt: skip
 
@@ -192,6 +193,7 @@ class Contest:
         return self._with(
             terms=[*self.terms, term], _rows=both, _size=first + count,
             _least=np.concatenate([self._least, term.least / term.scale]),
+            _mean=np.concatenate([self._mean, term.about / term.scale]),
             _places={**self._places, id(term): np.arange(first, first + count)},
         )  # fmt: skip
 
@@ -206,12 +208,12 @@ class Contest:
         chosen = self._chosen(terms)
         gram, right = self._moments(chosen)
         laws = self._laws(terms)
-        least = self._least[chosen].copy()
+        least, mean = self._least[chosen].copy(), self._mean[chosen]
         weight = self._start if near is None else near.weight
         arms = self._arms(terms)
         for _ in range(_ROUNDS if near is None else _NEAR):
             curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
-            numbers = _bounded(curvature, weight @ right, least)
+            numbers = _bounded(curvature, weight @ right + mean, least)
             for first, last, share in arms:
                 least[first] = max(share * float(np.linalg.norm(numbers[first + 1 : last])), 0.0)
                 numbers[first] = max(numbers[first], least[first])
@@ -220,7 +222,7 @@ class Contest:
         curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
         covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
         known = sum(one.log_likelihood for one in left)
-        size = -0.5 * float(numbers @ numbers) - 0.5 * float(np.linalg.slogdet(curvature)[1])
+        size = -0.5 * float(np.sum((numbers - mean) ** 2)) - 0.5 * float(np.linalg.slogdet(curvature)[1])
         return Fit(
             terms=tuple(terms), numbers=numbers, covariance=covariance, left=left, within=self.within,
             nats=known + size + self.prior(terms), weight=weight,
@@ -250,8 +252,12 @@ class Contest:
     def same(self, terms: Sequence[Term]) -> list[Term]:
         """Give this contest's terms of the words, sites and forms of another's."""
         forms = {(term.site, *term.kind): term for term in self.terms}
-        found = [forms.get((term.site, term.word, term.variant, FOUND)) for term in terms]
-        return [forms[term.site, *term.kind] if one is None else one for one, term in zip(found, terms, strict=True)]
+        found = []
+        for term in terms:
+            # A form that was found, else that of the grid; a secant became the slope where it led to.
+            kinds = (term.word, term.variant, FOUND), term.kind, (term.word, None, 0)
+            found.append(next(forms[term.site, *kind] for kind in kinds if (term.site, *kind) in forms))
+        return found
 
     def prior(self, terms: Sequence[Term]) -> float:
         """Nats of a set: each a cause of its own, or a word at several sites, as far as that is less."""
@@ -354,7 +360,7 @@ class Contest:
         chosen = self._chosen(fit.terms)
         gram, right = self._moments(chosen)
         curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
-        numbers = _bounded(curvature, weight @ right, self._least[chosen])
+        numbers = _bounded(curvature, weight @ right + self._mean[chosen], self._least[chosen])
         covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
         return replace(fit, numbers=numbers, covariance=covariance, weight=weight)
 
@@ -372,9 +378,10 @@ class Contest:
         for at, terms, blocks in self._alike:
             own = np.tensordot(weight, blocks, 1) + np.eye(at.shape[1])
             own -= gram[at] @ fit.covariance @ np.swapaxes(gram[at], 1, 2)
-            wanted = rest[at]
+            mean = self._mean[at]
+            wanted = rest[at] + mean
             gains = np.einsum("tk,tk->t", wanted, np.linalg.solve(own, wanted[..., None])[..., 0])
-            gains -= np.linalg.slogdet(own)[1]
+            gains -= np.linalg.slogdet(own)[1] + np.sum(mean**2, axis=1)
             found += zip((0.5 * gains).tolist(), terms, strict=True)
         return sorted(found, key=lambda one: one[0], reverse=True)
 

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from chladni.gap.robots.term import Number, Term, at_row, formed, units
+from chladni.gap.robots.term import PART, Number, Term, at_row, formed, units
 from chladni.gap.robots.torques import ALL_COMMANDS, LEAST_OVER, Torques
 from chladni.robots.joint_laws import followed
 from chladni.robots.robot import RobotJoint
@@ -53,11 +53,6 @@ def _loops(torques: Torques) -> Iterator[Term]:
 def _lagging(torques: Torques, row: int) -> Real:
     rate = torques.smooth(np.gradient(torques.fast_drive[row], 1.0 / torques.log.sample_rate_hz))
     return at_row(torques, torques.servo_row(row), rate)
-
-
-def _part() -> Number:
-    """All of what a limit takes is missing; the part tells how well its form was tried."""
-    return Number(name="part", unit="1", scale=1.0, least=0.5)
 
 
 def _saturation(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
@@ -111,7 +106,7 @@ def _limits(make: Callable[[float], Term], grid: Real, name: str, unit: str) -> 
 def _of_drive(torques: Torques, row: int, word: str, not_given: Callable[[], Real]) -> Term:
     """Give the law of a drive that doesn't give ``[sample]`` of what it's asked for."""
     return Term(
-        word=word, site=torques.joints[row % len(torques.joints)].name, numbers=(_part(),), takes=True,
+        word=word, site=torques.joints[row % len(torques.joints)].name, numbers=(PART,), takes=True,
         make=lambda: at_row(torques, row, torques.smooth(not_given())), rare=word != "saturation",
     )  # fmt: skip
 
@@ -134,20 +129,25 @@ def delays(torques: Torques) -> Iterator[Term]:
     """Commands that come late: all of them, or those of a joint beside them."""
     if torques.log.command_kind != "position" or (torques.by_effort and not torques.two_sided):
         return
-    believed, common = torques.robot.delay_s, torques.guesses.late_s.get(ALL_COMMANDS, 0.0)
+    believed, late_s = torques.robot.delay_s, torques.guesses.late_s
+    common = late_s.get(ALL_COMMANDS, 0.0)
     for secant_s in (None, *_SECANTS_S):
         # A secant says nothing of delays that are much shorter.
         least = -np.inf if secant_s is None else _OF_SECANT * secant_s
         delay = Number(name="delay", unit="s", scale=_DELAY_S, least=max(least, -believed), nominal=believed)
         own = Number(name="delay", unit="s", scale=_DELAY_S, least=max(least, -believed - common))
         variant = None if secant_s is None else f"over {secant_s:g} s"
-        late = torques.late(0.0, common if secant_s is None else secant_s)
-        make = partial(_at_all_servos, torques, late)
-        yield Term(word="delay", site=ALL_COMMANDS, make=make, numbers=(delay,), variant=variant)
+        # About what was found already a slope is exact.
+        if secant_s is None or ALL_COMMANDS not in late_s:
+            late = torques.late(0.0, common if secant_s is None else secant_s)
+            make = partial(_at_all_servos, torques, late)
+            yield Term(word="delay", site=ALL_COMMANDS, make=make, numbers=(delay,), variant=variant)
         late = torques.late(common, 0.0 if secant_s is None else secant_s)
         for row, joint in torques.rows:
-            found = torques.guesses.late_s.get(joint.name, 0.0)
-            alone = torques.late(common, found)[row] if secant_s is None and found else late[row]
+            found = late_s.get(joint.name, 0.0)
+            if secant_s is not None and found:
+                continue
+            alone = torques.late(common, found)[row] if found else late[row]
             make = partial(at_row, torques, torques.servo_row(row), alone)
             # One line carries the commands of all.
             yield Term(word="delay", site=joint.name, make=make, numbers=(own,), variant=variant, rare=True)

@@ -353,8 +353,9 @@ def _command(torques: Torques, position: Real, velocity: Real, torque: Real) -> 
 
 
 def _like(here: Sequence[Term], term: Term) -> Term:
-    """Give the term of the same word, site and kind, of the form that is nearest."""
-    same = [one for one in here if (*one.key, one.variant) == (*term.key, term.variant)]
+    """Give the term of the same word, site and kind, of the form that is nearest; or a plain one in its place."""
+    there = [one for one in here if one.key == term.key]
+    same = [one for one in there if one.variant == term.variant] or [one for one in there if one.variant is None]
     if not same:
         raise KeyError(term.key)
     return min(same, key=lambda one: 0.0 if term.form is None else abs(one.form_value - term.form_value))

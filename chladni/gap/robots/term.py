@@ -28,6 +28,8 @@ class Number:
         What it can't be below, beside the nominal one.
     nominal
         What the description believes, which is added when it's told.
+    about
+        What it's usually about, before the log is seen, beside the nominal one.
     """
 
     name: str
@@ -35,6 +37,12 @@ class Number:
     scale: float
     least: float = -np.inf
     nominal: float = 0.0
+    about: float = 0.0
+
+
+#: Of what a limit takes all is missing, within what servos' gains and filtered columns are off by: a form that needs
+#: another part is a wrong one.
+PART = Number(name="part", unit="1", scale=0.1, least=0.5, about=1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -154,6 +162,11 @@ class Term:
     def least(self) -> Real:
         """``[number]``."""
         return np.array([one.least for one in self.numbers])
+
+    @property
+    def about(self) -> Real:
+        """``[number]``."""
+        return np.array([one.about for one in self.numbers])
 
     @property
     def nominal(self) -> Real:

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from chladni.gap.robots.motion import rms
-from chladni.gap.robots.term import Number, Term, at_row, formed, length, usual
+from chladni.gap.robots.term import PART, Number, Term, at_row, formed, length, usual
 from chladni.gap.robots.torques import Torques
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
@@ -99,7 +99,6 @@ def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
     """Play before a link that the log reads: inside it nothing holds the motor, which follows its loop."""
     asked, kp, kd = torques.fast_asked[row], float(torques.kp[row]), float(torques.kd[row])
     step_s = 1.0 / torques.log.sample_rate_hz
-    part = Number(name="part", unit="1", scale=1.0, least=0.5)
     rows = tuple(dict.fromkeys([row, torques.servo_row(row)]))
     rotor = _rotor(torques, row, joint)
 
@@ -111,7 +110,7 @@ def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
             return np.concatenate([at_row(torques, torques.servo_row(row), pulled), at_row(torques, row, turning)])
 
         return Term(
-            word="backlash", site=joint.name, make=columns, numbers=(part, rotor), rows=rows, variant=AT_LINK,
+            word="backlash", site=joint.name, make=columns, numbers=(PART, rotor), rows=rows, variant=AT_LINK,
             takes=True, rare=True,
         )  # fmt: skip
 
