@@ -27,14 +27,15 @@ class Prepared:
 
     def __init__(self, recipe: Recipe) -> None:
         self.recipe = recipe
-        # Errors name the file as the user does, not as it was laid down here.
-        self._folder = TemporaryDirectory(prefix="chladni-recipe-")
         self.setup: Setup | None = None
-        if recipe.setup is not None:
-            self.setup = load_setup(self._laid_down(recipe.setup))
         self.model: Any = None
-        if recipe.model is not None:
-            self.model = self._loaded(recipe.model)
+        with TemporaryDirectory(prefix="chladni-recipe-") as folder:
+            # Errors name the file as the user does, not as it was laid down here.
+            self._folder = Path(folder)
+            if recipe.setup is not None:
+                self.setup = load_setup(self._laid_down(recipe.setup))
+            if recipe.model is not None:
+                self.model = self._loaded(recipe.model)
 
     def told(self, text: str) -> str:
         """Give a message with files called as the user calls them, and keys of the recipe in place of options."""
@@ -50,7 +51,7 @@ class Prepared:
         return open_log(path, setup=self.setup, **fitting_options(path, told))
 
     def _path(self, attached: Attached) -> Path:
-        return Path(self._folder.name) / Path(attached.path).name
+        return self._folder / Path(attached.path).name
 
     def _laid_down(self, attached: Attached) -> Path:
         path = self._path(attached)

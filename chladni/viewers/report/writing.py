@@ -89,10 +89,11 @@ def _findings(study: Study, style: Style) -> str:
 def _finding(group: FindingGroup) -> str:
     if not group.subject:
         return "".join(element("li", escaped(one)) for one in group.findings)
-    subject = element("code", escaped(group.subject))
     if len(group.findings) == 1:
-        return element("li", f"{subject}: {escaped(group.findings[0])}")
-    return element("li", subject + element("ul", "".join(element("li", escaped(one)) for one in group.findings)))
+        # A sentence as any other: a name that can't be told from words stands in it, too.
+        return element("li", escaped(f"{group.subject}: {group.findings[0]}"))
+    own = "".join(element("li", escaped(one)) for one in group.findings)
+    return element("li", element("code", escaped(group.subject)) + element("ul", own))
 
 
 def _modes(study: Study, style: Style) -> Iterator[str]:
