@@ -14,7 +14,7 @@ from matplotlib.collections import LineCollection, PathCollection, PolyCollectio
 from matplotlib.colors import to_hex, to_rgba
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.patches import Patch, Polygon, Rectangle
 from matplotlib.text import Annotation, Text
 from numpy.typing import ArrayLike
 
@@ -138,7 +138,9 @@ def _way(artist: Artist) -> Callable[[Axes, Target, Any], None]:
 
 def _places(axes: Axes, artist: Artist) -> tuple[bool, bool]:
     """Whether across and up are values of the axes; else they are shares of the frame."""
-    across, up = artist.get_transform().contains_branch_seperately(axes.transData)
+    # A patch's own transform stretches a unit square, from which Matplotlib 3.9 doesn't see the axes.
+    transform = artist.get_data_transform() if isinstance(artist, Patch) else artist.get_transform()
+    across, up = transform.contains_branch_seperately(axes.transData)
     return bool(across), bool(up)
 
 
