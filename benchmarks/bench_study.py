@@ -196,6 +196,8 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, help="of query: the folder of a study")
     given = parser.parse_args()
+    if given.what == "query" and given.out is None:
+        parser.error("query asks a study that is there: give its folder by --out")
     with tempfile.TemporaryDirectory(prefix="bench-study-") as name:
         match given.what:
             case "overhead":
