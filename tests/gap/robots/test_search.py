@@ -1,5 +1,7 @@
 """What a search looks at, and where it ends."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,9 +10,11 @@ from hypothesis import strategies as st
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.row import Row, columns_of_rows
 from chladni.gap.robots.search import alternatives, searched
-from chladni.gap.robots.torques import torques_of
-from chladni.robots.machine import Transmission, as_described
-from tests.robots.machines import arm, changed, commands, course, joint_log_of
+from chladni.gap.robots.solved import Solved, solved
+from chladni.gap.robots.torques import ALL_COMMANDS, torques_of
+from chladni.robots.machine import Machine, Transmission, as_described
+from chladni.robots.robot import Robot
+from tests.robots.machines import RATE_HZ, arm, changed, commands, course, joint_log_of
 
 pytest.importorskip("mujoco")
 
@@ -62,6 +66,35 @@ def test_weights_of_its_own_change_no_number(elastic: tuple[Contest, Fit]) -> No
     again = contest.weighed_as(best, best.weight)
     np.testing.assert_allclose(again.numbers, best.numbers, atol=0.05)
     assert again.nats == best.nats
+
+
+def without_noise(robot: Robot, machine: Machine, late: int = 0) -> Solved:
+    """What a log of a machine whose commands come so many samples late is explained by."""
+    command = commands(SECONDS)
+    position = course(machine, np.roll(command, late, axis=1))
+    position = 2.0 * np.pi / 2**16 * np.rint(position / (2.0 * np.pi / 2**16))
+    return solved(torques_of(robot, joint_log_of(robot, position, command=command)), frozenset(), lambda _: None)
+
+
+def test_a_dead_zone_takes_all_so_that_its_width_is_told(tmp_path: Path) -> None:
+    robot = arm(tmp_path)
+    (found,) = without_noise(robot, changed(as_described(robot), 0, dead=1.0)).best.terms
+    assert found.key == ("dead_zone", "shoulder")
+    # Wider, and a part of it, would fit as well.
+    assert found.form_value == pytest.approx(1.0, rel=0.03)
+
+
+def test_about_a_delay_that_was_found_only_its_slope_is_left(tmp_path: Path) -> None:
+    robot = arm(tmp_path)
+    found = without_noise(robot, as_described(robot), late=3)
+    common, own = (
+        {term.variant for term in found.contest.terms if term.word == "delay" and term.site == site}
+        for site in (ALL_COMMANDS, "shoulder")
+    )
+    assert common == {None}
+    assert len(own) > 1
+    assert [term.key for term in found.best.terms] == [("delay", ALL_COMMANDS)]
+    assert found.best.values(0)[0][0] == pytest.approx(3 / RATE_HZ, abs=5e-4)
 
 
 @given(seed=st.integers(0, 2**32 - 1), acting=st.lists(st.booleans(), min_size=2, max_size=8))
