@@ -14,7 +14,7 @@ from chladni.cli.words import NOTHING, count, number, unit, with_error
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from distributed import Client
 
@@ -180,13 +180,15 @@ def _print_trends(to: Output, followed: "Trends", verdict: "Verdict") -> None:
         to.line(f"all within their bands: {counted(verdict.checked, 'check')}")
 
 
-def _outside(verdict: "Verdict") -> tuple[list[str], list[list[str]]]:
+def _outside(
+    verdict: "Verdict", *, as_written: "Callable[[str], str]" = str
+) -> tuple[list[str], list[list[str]]]:
     rows = [
         [
             one.what,
             Path(one.log).name or "latest level",
             with_error(one.value, one.std),
-            unit(one.unit),
+            unit(as_written(one.unit)),
             f"{_end(one.low)} to {_end(one.high)}",
             one.rule,
         ]
@@ -204,8 +206,10 @@ def _write(
     to: Output, out: Path, followed: "Trends", verdict: "Verdict", *, report: Path | None, save: Path | None
 ) -> None:
     from chladni.apps.study.trends import trend_sentences
+    from chladni.viewers.labels import printed_unit
 
-    changes = trend_sentences(followed.trends)
+    # A page and a recording write units as their pictures do.
+    changes = trend_sentences(followed.trends, unit=printed_unit)
     title = f"{out.name}: {counted(followed.logs, 'log')}"
     if report is not None:
         from chladni.viewers.report.trends import TrendPage, write_trend_report
@@ -214,7 +218,7 @@ def _write(
             title=title,
             trends=followed.trends,
             changes=changes,
-            tables={"Outside the band": _outside(verdict)},
+            tables={"Outside the band": _outside(verdict, as_written=printed_unit)},
             notes=(*followed.notes, *verdict.missing),
         )
         to.line(f"report: {write_trend_report(page, report)}")

@@ -81,7 +81,7 @@ def run_study(
     Raises
     ------
     SetupError
-        When the folder holds another study, the cluster goes away, or there is no log.
+        When the folder holds another study, the cluster goes away, there is no log, or a path isn't there.
     LogError
         When the folder can't be written to. What is done stays.
     """

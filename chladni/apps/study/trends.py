@@ -1,6 +1,6 @@
 """Modes, levels, lines and causes of a study, followed over its logs."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -272,15 +272,15 @@ def _trend(points: _Points, logs: Sequence[Row], covariates: Sequence[_Covariate
     )  # fmt: skip
 
 
-def trend_sentences(trends: Iterable[Trend]) -> tuple[str, ...]:
-    """Say what changed, when, and by how much; the surest first."""
+def trend_sentences(trends: Iterable[Trend], *, unit: Callable[[str], str] = str) -> tuple[str, ...]:
+    """Say what changed, when, and by how much; the surest first. `unit` gives a unit as it's to be written."""
     told = []
     for one in trends:
+        of = "" if one.unit == "1" else f" {unit(one.unit)}"
         for change in one.changes:
             sure = abs(change.step) / max(change.step_std, 1e-300)
-            told.append(
-                (-sure, f"{title(one)} changed by {_step(one, change.step, change.step_std)} {_when(one, change)}")
-            )
+            step = with_sigma(change.step, change.step_std)
+            told.append((-sure, f"{title(one)} changed by {step}{of} {_when(one, change)}"))
     return tuple(sentence for _, sentence in sorted(told))
 
 
@@ -294,11 +294,6 @@ def title(trend: Trend) -> str:
         case "level":
             return f"RMS of {trend.name}"
     return trend.name
-
-
-def _step(trend: Trend, step: float, std: float) -> str:
-    unit = "" if trend.unit == "1" else f" {trend.unit}"
-    return f"{with_sigma(step, std)}{unit}"
 
 
 def _when(trend: Trend, change: Any) -> str:

@@ -89,24 +89,49 @@ def find_logs(words: Sequence[str]) -> tuple[LogAddress, ...]:
     Returns
     -------
     tuple of LogAddress
-        In the order of their names, each once. A file that isn't there is among them: that's a failure of one log.
+        In the order of their names, each once.
 
     Raises
     ------
     SetupError
-        When a folder or a pattern holds no log, or what opens an address isn't installed.
+        When a path or an address isn't there, a folder or a pattern holds no log, or what opens an address isn't
+        installed.
     StoreError
         When a store can't be listed.
     """
     found: dict[str, LogAddress] = {}
+    _require_there([word for word in words if not is_address(word)])
     for word in words:
         for one in _in_store(word) if is_address(word) else _on_disk(word):
             found[one.url] = one
     return tuple(found[url] for url in sorted(found))
 
 
+def _require_there(words: Sequence[str]) -> None:
+    """Refuse slips before any work: the row of a log that never was would stay in the tables."""
+    absent = [visible(word) for word in words if _is_absent(_path(word))]
+    if absent:
+        more = f" and {len(absent) - 3} more" if len(absent) > 3 else ""
+        raise SetupError(f"{', '.join(absent[:3])}{more}: no such file or folder; correct the path or leave it out")
+
+
+def _is_absent(path: Path) -> bool:
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return True
+    except (OSError, ValueError):
+        # Something may be there that can't be read: told as what is wrong with this log.
+        return False
+    return False
+
+
+def _path(word: str) -> Path:
+    return Path(word.removeprefix("file://").removeprefix("local://"))
+
+
 def _on_disk(word: str) -> list[LogAddress]:
-    path = Path(word.removeprefix("file://").removeprefix("local://"))
+    path = _path(word)
     if path.is_dir():
         inside = [Path(folder) / name for folder, _, names in os.walk(path) for name in names if _is_log(name)]
         if not inside:

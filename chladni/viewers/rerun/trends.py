@@ -14,6 +14,7 @@ from chladni.signals.arrays import Whole
 from chladni.signals.trend import Trend
 from chladni.signals.visible import visible
 from chladni.viewers.figures.trends import SECTIONS
+from chladni.viewers.labels import printed_unit
 from chladni.viewers.rerun.drawing import new_recording
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.style import ON_DARK
@@ -82,7 +83,7 @@ def _draw(recording: rr.RecordingStream, trend: Trend, place: int) -> rrb.View:
     # Two names may be one when they are written as paths.
     path = folder("trends", trend.kind, f"{place} {trend.name}")
     index = _index(trend)
-    unit = "" if trend.unit == "1" else f" [{trend.unit}]"
+    unit = "" if trend.unit == "1" else f" [{printed_unit(trend.unit)}]"
     if trend.covariates:
         measured = rr.SeriesPoints(names="as measured", colors=[(*EXPECTED, 110)], marker_sizes=1.5)
         recording.log(f"{path}/measured", measured, static=True)

@@ -222,11 +222,35 @@ def test_what_a_crash_left_in_the_journal_is_in_the_tables_afterwards(
     assert not list((out / ".study" / "journal").iterdir())
 
 
+def test_paths_that_arent_there_are_refused_before_anything_is_done(
+    recipe: Path, logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, names = tmp_path / "out", [str(logs / f"{name}.mcap") for name in ("run9", "run1", "rnu0")]
+    assert main(["study", str(recipe), *names, "--out", str(out)]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert f"{names[0]}, {names[2]}: no such file or folder" in line
+    assert not out.exists()
+
+
+def test_a_link_to_nothing_in_a_folder_of_logs_is_a_row(
+    client: Any, recipe: Path, logs: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    (folder / "run1.mcap").symlink_to(logs / "run1.mcap")
+    (folder / "gone.mcap").symlink_to(logs / "gone.mcap")
+    report = run_study(load_recipe(recipe), [str(folder)], tmp_path / "out", connect=partial(nullcontext, client))
+    assert (report.done, report.unread) == (2, 1)
+    [(log, step, reason)] = report.failures
+    assert (log, step) == (str(folder / "gone.mcap"), "read")
+    assert "no such file" in reason
+
+
 def test_a_folder_belongs_to_one_recipe(client: Any, found: "chladni.StudyResults", tmp_path: Path) -> None:
     other = tmp_path / "other.toml"
     other.write_text(RECIPE.replace("2.0", "4.0"))
     with pytest.raises(SetupError, match="holds results of another recipe"):
-        run_study(load_recipe(other), [str(tmp_path / "no.mcap")], found.path, connect=partial(nullcontext, client))
+        run_study(load_recipe(other), [], found.path, connect=partial(nullcontext, client))
     # How results are followed decides no row.
     followed = tmp_path / "followed.toml"
     followed.write_text(RECIPE + "[trend]\nleast_mac = 0.9\n")

@@ -162,6 +162,10 @@ def test_the_command_ends_with_3_when_something_left_its_band(
     html = page.read_text()
     assert "Outside the band" in html
     assert "mode 1 (3.994 Hz) changed by" in html
+    # Sentences, tables and pictures write one unit in one way.
+    assert "RMS of /tip.x, 0.5 to 20 Hz changed by" in html
+    assert "m/s²" in html
+    assert "m/s^2" not in html
     assert recording.stat().st_size > 10_000
     recipe.write_text(recipe.read_text().replace("1.3", "3.0"))
     assert main(words[:5]) == 0
