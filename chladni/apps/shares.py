@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chladni.apps.sources import Span, Watched, no_progress
 from chladni.io.log import Log
-from chladni.io.log_reader import SampleGrid
+from chladni.io.shared_grid import SampleGrid
 from chladni.io.source import block_seconds
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
-from chladni.io.log_reader import MostlyEmptyError, SampleGrid, several_grids
+from chladni.io.log_reader import MostlyEmptyError
+from chladni.io.shared_grid import SampleGrid, several_grids
 from chladni.io.source import block_seconds, is_small
 from chladni.signals.arrays import Real
 from chladni.signals.errors import LogError

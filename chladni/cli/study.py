@@ -180,9 +180,7 @@ def _print_trends(to: Output, followed: "Trends", verdict: "Verdict") -> None:
         to.line(f"all within their bands: {counted(verdict.checked, 'check')}")
 
 
-def _outside(
-    verdict: "Verdict", *, as_written: "Callable[[str], str]" = str
-) -> tuple[list[str], list[list[str]]]:
+def _outside(verdict: "Verdict", *, as_written: "Callable[[str], str]" = str) -> tuple[list[str], list[list[str]]]:
     rows = [
         [
             one.what,

@@ -13,10 +13,10 @@ from chladni.io.files.formats import read_file
 from chladni.io.known_schemas import likely_role
 from chladni.io.log import Log, outside
 from chladni.io.log_info import LogInfo, some_of, unread_sentences
-from chladni.io.log_reader import SampleGrid
 from chladni.io.log_survey import survey_file
 from chladni.io.loss import Loss, Unread
 from chladni.io.setup import ChannelSetup, Setup, refined
+from chladni.io.shared_grid import SampleGrid
 from chladni.io.stamps import StampRequest
 from chladni.signals.channel import Channel, channel_names
 from chladni.signals.errors import EstimateError, LogError, SetupError

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 from chladni.io.files.formats import MCAP, file_kind
 from chladni.io.log_info import LogInfo
-from chladni.io.log_reader import SampleGrid, StampedSamples, several_grids
+from chladni.io.log_reader import StampedSamples
 from chladni.io.loss import Loss, Unread
 from chladni.io.mcap.limits import Limits
 from chladni.io.setup import Setup, load_setup
+from chladni.io.shared_grid import SampleGrid, several_grids
 from chladni.io.stamps import StampRequest
 from chladni.signals.channel import Channel, Names, as_names
 from chladni.signals.channel_names import require_one

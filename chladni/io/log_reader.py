@@ -3,22 +3,21 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.clock.grid_index import NOWHERE
 from chladni.io.clock.shared_clocks import Key, Stamped, StreamClock
+from chladni.io.first_pass import FirstPass, PiecePlaces
 from chladni.io.gathering import Gathering, LostMessages, gather, place_all, running_on, windowed
 from chladni.io.grid_blocks import BlockGrid, PlacedPiece, blocks_of, complete
 from chladni.io.grid_buffer import GridBuffer, grid_rows
 from chladni.io.mcap.container import McapContainer
-from chladni.io.placement import Placement, StatedRate, lowest_index
+from chladni.io.placement import Placement, StatedRate
 from chladni.io.repeats import digests_of
-from chladni.io.shared_grid import ALIGNED, Group, group_placements
+from chladni.io.shared_grid import Group, SampleGrid, group_placements, several_grids
 from chladni.io.stream import Piece, Stream, read_pieces
-from chladni.signals.arrays import Mask, Whole
+from chladni.signals.arrays import Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
@@ -56,29 +55,6 @@ class Window:
     told: str = "in the log"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SampleGrid:
-    """Channels that share sampling rate and sample times.
-
-    Attributes
-    ----------
-    names
-        Of the channels.
-    sample_rate_hz, start_time_ns, samples
-        As the `TimeSeries` of these channels will have them.
-    """
-
-    names: tuple[str, ...]
-    sample_rate_hz: float
-    start_time_ns: int
-    samples: int
-
-    @property
-    def duration_s(self) -> float:
-        """Number of samples over the rate."""
-        return self.samples / self.sample_rate_hz
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StampedSamples:
     """Samples at the times that their messages give.
@@ -96,28 +72,6 @@ class StampedSamples:
     channels: tuple[Channel, ...]
     times_ns: Whole
     values: NDArray[np.floating]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FirstPass:
-    """What a pass over the stamps tells.
-
-    Attributes
-    ----------
-    placements
-        One for each stream, in their order.
-    sizes
-        Stream and number of messages of each piece, in the order of the file.
-    every
-        Number of messages of each piece before empty ones, and those outside the window, were left out.
-    dtype
-        That holds the samples.
-    """
-
-    placements: tuple[Placement, ...]
-    sizes: tuple[tuple[int, int], ...]
-    every: tuple[int, ...]
-    dtype: np.dtype[Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -208,7 +162,7 @@ class LogReader:
             )
         return tuple(found)
 
-    def first_pass(self) -> "FirstPass":
+    def first_pass(self) -> FirstPass:
         """Read stamps alone and fit the time bases: all that must be known before blocks can be given."""
         every: list[int] = []
         sizes: list[tuple[int, int]] = []
@@ -244,7 +198,7 @@ class LogReader:
         return placements
 
     def blocks(
-        self, known: "FirstPass", seconds: float, between: tuple[int, int] | None = None
+        self, known: FirstPass, seconds: float, between: tuple[int, int] | None = None
     ) -> Iterator[TimeSeries]:
         """Everything, or what lies between two numbers of samples, block by block, in a second pass.
 
@@ -266,25 +220,15 @@ class LogReader:
             block_samples=max(1, round(seconds * group.rate_hz)),
             dtype=known.dtype,
         )
-        members = {id(one.stream): number for number, one in enumerate(group.placements)}
-        member_of = [members.get(id(one.stream)) for one in known.placements]
-        parts = _parts(known.sizes, member_of)
-        lowest, highest = _extents(parts, group.placements)
-        wanted = None
         # Where stamps or a window decide what a piece holds, each has to be decoded.
-        if between is not None and self.window == Window() and not self.known_clocks:
-            needed = (lowest < last) & (highest > first)
-            wanted = _among_every(known.every, needed)
-            parts = [part for part, needs in zip(parts, needed.tolist(), strict=True) if needs]
-            lowest, highest = lowest[needed], highest[needed]
-        mine = np.array([part[0] is not None for part in parts], bool)
-        lowest, highest = lowest[mine], highest[mine]
+        apart = between is not None and self.window == Window() and not self.known_clocks
+        places = known.places(group.placements, within=(first, last) if apart else None)
         return chain.from_iterable(
-            blocks_of(part, self._placed(parts, wanted, group.placements, rows.rows), complete(lowest, last))
-            for part in grid.parts(lowest, highest)
+            blocks_of(part, self._placed(places, group.placements, rows.rows), complete(places.lowest, last))
+            for part in grid.parts(places.lowest, places.highest)
         )
 
-    def grids(self, known: "FirstPass") -> tuple[SampleGrid, ...]:
+    def grids(self, known: FirstPass) -> tuple[SampleGrid, ...]:
         """What grids the channels lie on; see `groups`."""
         found = []
         for group in self.groups(known.placements):
@@ -404,58 +348,17 @@ class LogReader:
         return tuple(series)
 
     def _placed(
-        self,
-        parts: Sequence["_Part"],
-        wanted: Sequence[bool] | None,
-        placements: Sequence[Placement],
-        rows: Sequence[tuple[int, ...]],
+        self, places: PiecePlaces, placements: Sequence[Placement], rows: Sequence[tuple[int, ...]]
     ) -> Iterator[PlacedPiece]:
         """Read samples a second time, now with their places."""
-        for (member, part), (_, piece) in zip(parts, self.pieces(wanted=wanted), strict=True):
+        for (member, part), (_, piece) in zip(places.parts, self.pieces(wanted=places.wanted), strict=True):
             if member is not None:
                 index = placements[member].samples_index(part)
                 yield PlacedPiece(rows=rows[member], index=index, values=piece.values)
 
 
-#: The placement that a piece belongs to, if any, and which of its messages the piece holds.
-_Part = tuple[int | None, slice]
-
-
 def _values_on(group: Group, extent: tuple[int, int]) -> int:
     return (extent[1] - extent[0]) * sum(len(placement.stream.sources) for placement in group.placements)
-
-
-def several_grids(file: str, told: Sequence[tuple[Sequence[Channel], float, int]]) -> str:
-    """Say that channels, with rates and times of a sample in ns, don't share one grid, in what, and what to do."""
-    _, first_hz, first_ns = told[0]
-    grids = [
-        f"{_names(channels)} at {_beside(rate_hz, start_ns, first_hz, first_ns) if place else f'{rate_hz:.6g} Hz'}"
-        for place, (channels, rate_hz, start_ns) in enumerate(told)
-    ]
-    highest_hz = f"{max(rate_hz for _, rate_hz, _ in told):.6g}"
-    return (
-        f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; bring them to one: "
-        f"chladni convert {file} OUT.mcap --resample {highest_hz}, in Python sample_rate_hz={highest_hz} or "
-        'join="auto"'
-    )
-
-
-def _beside(rate_hz: float, start_ns: int, first_hz: float, first_ns: int) -> str:
-    """Say a rate, and in what the grid differs from the first where the rate alone doesn't show it."""
-    if f"{rate_hz:.6g}" != f"{first_hz:.6g}":
-        return f"{rate_hz:.6g} Hz"
-    later = (start_ns - first_ns) / NS_PER_S * rate_hz
-    between = later - round(later)
-    if abs(between) > ALIGNED:
-        when = "after" if between > 0 else "before"
-        return f"{rate_hz:.6g} Hz, {1e3 * abs(between) / rate_hz:.3g} ms {when} those of the first"
-    # Grids that agree where they begin drift apart, or are too far apart to be one.
-    return f"{rate_hz:.10g} Hz, beginning {later / rate_hz:.6g} s after the first, which is at {first_hz:.10g} Hz"
-
-
-def _names(channels: Sequence[Channel]) -> str:
-    more = f" and {len(channels) - 3} more" if len(channels) > 3 else ""
-    return ", ".join(channel.name for channel in channels[:3]) + more
 
 
 def _sized(pieces: Iterable[tuple[int, Piece]], sizes: list[int]) -> Iterator[tuple[int, Piece]]:
@@ -463,39 +366,3 @@ def _sized(pieces: Iterable[tuple[int, Piece]], sizes: list[int]) -> Iterator[tu
     for stream, piece in pieces:
         sizes.append(piece.stamps_ns.size)
         yield stream, piece
-
-
-def _parts(sizes: Sequence[tuple[int, int]], member_of: Sequence[int | None]) -> "list[_Part]":
-    """Where each piece stands among the messages of its placement."""
-    starts: dict[int, int] = {}
-    parts: list[_Part] = []
-    for stream, messages in sizes:
-        member = member_of[stream]
-        start = 0 if member is None else starts.get(member, 0)
-        parts.append((member, slice(start, start + messages)))
-        if member is not None:
-            starts[member] = start + messages
-    return parts
-
-
-def _extents(parts: "Sequence[_Part]", placements: Sequence[Placement]) -> tuple[Whole, Whole]:
-    """Lowest and highest grid index of each piece, in the order of the file; nowhere for those without placement."""
-    extents = []
-    for member, part in parts:
-        if member is None:
-            extents.append((-NOWHERE, NOWHERE))
-            continue
-        placement = placements[member]
-        ends = placement.index[part] + (1 if placement.counts is None else placement.counts[part])
-        # A piece of which nothing has a place on the grid isn't waited for.
-        extents.append((lowest_index(placement.index[part], otherwise=-NOWHERE), int(ends.max())))
-    lowest, highest = np.array(extents, np.int64).reshape(-1, 2).T
-    return lowest, highest
-
-
-def _among_every(every: Sequence[int], needed: Mask) -> list[bool]:
-    """Say of each piece up to the last needed one whether it is; `needed` leaves out the empty ones."""
-    flags = iter(needed.tolist())
-    wanted = [bool(size) and next(flags) for size in every]
-    # Nothing is read behind the last one.
-    return wanted[: 1 + max((place for place, one in enumerate(wanted) if one), default=-1)]

@@ -13,16 +13,18 @@ import numpy as np
 from chladni.io.catalog import Catalog, read_catalog
 from chladni.io.channel_source import ChannelSource
 from chladni.io.clock.shared_clocks import Key, StreamClock, clocks_of
+from chladni.io.first_pass import FirstPass
 from chladni.io.gathering import LostMessages, gather
 from chladni.io.log import Log, outside
 from chladni.io.log_info import LogInfo, oddities, unread_sentences
-from chladni.io.log_reader import FirstPass, LogReader, SampleGrid, StampedSamples, Window
+from chladni.io.log_reader import LogReader, StampedSamples, Window
 from chladni.io.log_survey import survey
 from chladni.io.loss import Loss, Unread, losses
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.limits import Limits
 from chladni.io.number_lists import NumberLists
 from chladni.io.setup import Setup
+from chladni.io.shared_grid import SampleGrid
 from chladni.io.stamps import StampRequest
 from chladni.io.stream import Stream, read_pieces
 from chladni.signals.channel import Channel

@@ -1,4 +1,4 @@
-"""Which streams share one grid, and how far it reaches."""
+"""Which streams share one grid, how far it reaches, and what is said of several."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,6 +9,7 @@ from chladni.io.clock.grid_index import NOWHERE
 from chladni.io.clock.time_base import TimeBase
 from chladni.io.placement import Placement
 from chladni.signals.arrays import Real, Whole
+from chladni.signals.channel import Channel
 from chladni.signals.time_series import NS_PER_S
 
 #: Two grids are one when their points are never farther apart than this share of a period: 1.8 degrees at Nyquist.
@@ -19,6 +20,29 @@ LOOSELY_ALIGNED = 0.05
 RATES_ALIKE = 0.01
 #: A grid over two recordings has at most so many places for a message.
 SPARSEST = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampleGrid:
+    """Channels that share sampling rate and sample times.
+
+    Attributes
+    ----------
+    names
+        Of the channels.
+    sample_rate_hz, start_time_ns, samples
+        As the `TimeSeries` of these channels will have them.
+    """
+
+    names: tuple[str, ...]
+    sample_rate_hz: float
+    start_time_ns: int
+    samples: int
+
+    @property
+    def duration_s(self) -> float:
+        """Number of samples over the rate."""
+        return self.samples / self.sample_rate_hz
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,3 +241,36 @@ def _index_at(base: TimeBase, times_ns: Whole) -> Real:
 def _scatter(base: TimeBase) -> float:
     """Four sigma of the end of a fitted line, in periods: 2 sigma/sqrt(n) at the ends of a straight line."""
     return 8.0 * base.jitter_s * base.rate_hz / float(np.sqrt(max(1, base.samples)))
+
+
+def several_grids(file: str, told: Sequence[tuple[Sequence[Channel], float, int]]) -> str:
+    """Say that channels, with rates and times of a sample in ns, don't share one grid, in what, and what to do."""
+    _, first_hz, first_ns = told[0]
+    grids = [
+        f"{_names(channels)} at {_beside(rate_hz, start_ns, first_hz, first_ns) if place else f'{rate_hz:.6g} Hz'}"
+        for place, (channels, rate_hz, start_ns) in enumerate(told)
+    ]
+    highest_hz = f"{max(rate_hz for _, rate_hz, _ in told):.6g}"
+    return (
+        f"{file}: channels have {len(grids)} different sampling grids: {'; '.join(grids)}; bring them to one: "
+        f"chladni convert {file} OUT.mcap --resample {highest_hz}, in Python sample_rate_hz={highest_hz} or "
+        'join="auto"'
+    )
+
+
+def _beside(rate_hz: float, start_ns: int, first_hz: float, first_ns: int) -> str:
+    """Say a rate, and in what the grid differs from the first where the rate alone doesn't show it."""
+    if f"{rate_hz:.6g}" != f"{first_hz:.6g}":
+        return f"{rate_hz:.6g} Hz"
+    later = (start_ns - first_ns) / NS_PER_S * rate_hz
+    between = later - round(later)
+    if abs(between) > ALIGNED:
+        when = "after" if between > 0 else "before"
+        return f"{rate_hz:.6g} Hz, {1e3 * abs(between) / rate_hz:.3g} ms {when} those of the first"
+    # Grids that agree where they begin drift apart, or are too far apart to be one.
+    return f"{rate_hz:.10g} Hz, beginning {later / rate_hz:.6g} s after the first, which is at {first_hz:.10g} Hz"
+
+
+def _names(channels: Sequence[Channel]) -> str:
+    more = f" and {len(channels) - 3} more" if len(channels) > 3 else ""
+    return ", ".join(channel.name for channel in channels[:3]) + more
