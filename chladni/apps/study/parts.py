@@ -80,8 +80,7 @@ class Sums:
     def of(cls, content: bytes) -> "Sums":
         """Read what a worker gave; `LogError` when it's nothing of the kind."""
         header, _ = _opened(content)
-        told = {name: _grid(one) for name, one in header["told"].items()}
-        return cls(**{**header, "told": told}, content=content)
+        return cls(**header, content=content)
 
 
 def parts_of(address: LogAddress, steps: Sequence[str], threads: int) -> int:
@@ -157,7 +156,7 @@ def read_sums(contents: Sequence[bytes], step: str) -> Gathered:
     return Gathered(
         step=step,
         sums=[sums for _, sums in opened],
-        told=[{name: _grid(one) for name, one in header["told"].items()} for header, _ in opened],
+        told=[header["told"] for header, _ in opened],
     )
 
 
@@ -196,6 +195,7 @@ def _opened(content: bytes) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     try:
         with np.load(BytesIO(content), allow_pickle=False) as arrays:
             header = json.loads(arrays["arr_0"].tobytes())
+            header["told"] = {name: _grid(one) for name, one in header["told"].items()}
             return header, {name: arrays[f"arr_{place}"] for place, name in enumerate(header.pop("names"), 1)}
     except (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, BadZipFile) as error:
         raise LogError(f"the sums of a part are damaged: {error}; run the study again") from error

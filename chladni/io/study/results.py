@@ -1,7 +1,7 @@
 """What a study found: its tables, and SQL over them by DuckDB, which sees nothing else."""
 
 import csv
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from math import isfinite
@@ -176,10 +176,11 @@ def write_answer(path: Path, answer: pa.Table) -> Path:
     LogError
         When the file can't be written.
     """
-    with atomic_path(path) as place:
-        _write_table(
-            place, answer.schema.names, ([_field(one) for one in row.values()] for row in plain_rows(answer))
-        )
+    rows = ([_field(one) for one in row.values()] for row in plain_rows(answer))
+    with atomic_path(path) as place, place.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(answer.schema.names)
+        writer.writerows(rows)
     return path
 
 
@@ -187,18 +188,5 @@ def _field(value: Any) -> str:
     if isinstance(value, list):
         return " ".join(map(_field, value))
     if isinstance(value, float):
-        return _number_text(value)
+        return f"{value:.17g}" if isfinite(value) else ""
     return "" if value is None else cell_text(str(value))
-
-
-def _write_table(path: Path, columns: Sequence[str], rows: Iterable[list[str]]) -> None:
-    """Write a table as RFC 4180 has it, one header line first."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(rows)
-
-
-def _number_text(number: float) -> str:
-    """Give a number with all its digits, nothing where it isn't known."""
-    return f"{float(number):.17g}" if isfinite(number) else ""

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import nullcontext
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -130,3 +131,10 @@ def test_damaged_sums_are_refused(recipe: Recipe, log: Path) -> None:
     for damaged in (b"", content[:100], content[: len(content) // 2], b"PK" + content[3:]):
         with pytest.raises(LogError, match="sums of a part are damaged"):
             Sums.of(damaged)
+
+
+def test_sums_of_another_kind_are_refused() -> None:
+    file = BytesIO()
+    np.savez(file, np.frombuffer(b'{"names": [], "told": {"psd//tip.x": {"samples": 8}}}', np.uint8))
+    with pytest.raises(LogError, match="sums of a part are damaged"):
+        Sums.of(file.getvalue())
