@@ -107,7 +107,7 @@ class Engine(Generic[Item]):
         self._seconds.append(seconds)
 
     def _fill(self, waiting: Iterator[Item]) -> None:
-        room = AHEAD * max(1, self._threads()) - len(self._running)
+        room = AHEAD * max(1, self.threads()) - len(self._running)
         while room > 0:
             batch = self._again.popleft() if self._again else self._new(waiting)
             if batch is None:
@@ -129,7 +129,7 @@ class Engine(Generic[Item]):
         self._running[key] = (future, batch)
         future.add_done_callback(self._ended.put)
 
-    def _threads(self) -> int:
+    def threads(self) -> int:
         """Threads of all workers; asked for now and then, since workers come and go."""
         now_s = time.monotonic()
         if now_s >= self._ask_at_s:
@@ -150,7 +150,7 @@ class Engine(Generic[Item]):
                 pass
             if self.client.status == "closed":
                 raise SetupError("the scheduler has gone; what is done stays: run it again to go on")
-            if self.client.status == "running" and self._threads():
+            if self.client.status == "running" and self.threads():
                 alive_s = time.monotonic()
             elif time.monotonic() - alive_s > PATIENCE_S:
                 what = "no worker" if self.client.status == "running" else "no scheduler"

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from chladni.apps.study.cluster import Connect
 from chladni.apps.study.engine import Answer, Engine
-from chladni.apps.study.parts import Sums, parts_of, share, sum_part
+from chladni.apps.study.parts import MOST_PARTS, Sums, parts_of, share, sum_part
 from chladni.apps.study.work import Task, work_on
 from chladni.io.study.folder import StudyFolder, opened_folder
 from chladni.io.study.logs import LogAddress, find_logs
@@ -131,16 +131,16 @@ def _answers(
     engine: Engine[Task], folder: StudyFolder, waiting: Sequence[LogAddress], recipe: Recipe, report: StudyReport
 ) -> Iterator[Answer[Task]]:
     """Do all logs; those that are so large that workers share them come last, one after another."""
-    threads = sum(engine.client.nthreads().values())
-    parts = {one: parts_of(one, recipe.steps, threads) for one in waiting}
-    yield from engine.run(_task(folder, one) for one in waiting if parts[one] == 1)
+    large = {one for one in waiting if parts_of(one, recipe.steps, MOST_PARTS) > 1}
+    yield from engine.run(_task(folder, one) for one in waiting if one not in large)
     work = partial(sum_part, recipe.to_json())
-    for one in waiting:
-        if parts[one] > 1:
-            sums = share(engine.client, work, one.url, parts[one])
-            report.seconds += sum(part.seconds for part in sums)
-            report.cpu_s += sum(part.cpu_s for part in sums)
-            yield from engine.run([_task(folder, one, sums)])
+    for one in sorted(large, key=lambda one: one.url):
+        # Asked for each time: clusters may start workers when there is work.
+        parts = parts_of(one, recipe.steps, engine.threads())
+        sums = share(engine.client, work, one.url, parts) if parts > 1 else ()
+        report.seconds += sum(part.seconds for part in sums)
+        report.cpu_s += sum(part.cpu_s for part in sums)
+        yield from engine.run([_task(folder, one, sums)])
 
 
 def _task(folder: StudyFolder, address: LogAddress, sums: Sequence[Sums] = ()) -> Task:

@@ -79,7 +79,8 @@ def _overview(trends: Sequence[Trend]) -> Table:
     for one in trends:
         last = with_sigma(float(one.values[-1]), float(one.std[-1]))
         slopes = "; ".join(
-            f"{effect.channel}: {with_sigma(effect.slope, effect.slope_std)} {printed_unit(effect.unit)}"
+            f"{effect.channel}: {with_sigma(effect.slope, effect.slope_std)} "
+            + printed_unit(effect.unit).removeprefix("1 ")
             for effect in one.covariates
         )
         row = (

@@ -111,6 +111,22 @@ def test_a_log_that_changed_while_it_was_shared_is_done_by_one(
     assert files[0] == files[1]
 
 
+def test_a_log_is_shared_by_workers_that_came_after_the_start(
+    client: Any, log: Path, recipe: Recipe, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short = write_log(tmp_path / "short.mcap", seconds=4.0)
+    monkeypatch.setattr("chladni.apps.study.parts.LARGE_BYTES", log.stat().st_size)
+    monkeypatch.setattr("chladni.apps.study.parts.PART_BYTES", 1)
+    monkeypatch.setattr("chladni.apps.study.engine.ASK_EVERY_S", 0.0)
+    asked, shared = iter([{}]), []
+    monkeypatch.setattr(client, "nthreads", lambda: next(asked, {"a worker": 2}))
+    share = study.share
+    monkeypatch.setattr(study, "share", lambda *words: shared.append(words[2:]) or share(*words))
+    report = study.run_study(recipe, [str(short), str(log)], tmp_path / "out", connect=partial(nullcontext, client))
+    assert (report.done, report.failures) == (2, [])
+    assert shared == [(str(log), 2)]
+
+
 def test_why_a_log_cant_be_shared_is_told(recipe: Recipe, tmp_path: Path) -> None:
     sums = Sums.of(sum_part(recipe.to_json(), [PartTask(str(tmp_path / "none.mcap"), 0, 2)]))
     assert "none.mcap" in sums.why_whole
