@@ -2,16 +2,15 @@
 
 import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from chladni.apps.excitation import FORCE_UNITS, excitations
-from chladni.apps.live_modes import ModeJob, ModeLook, ModeLooks, Schedule
-from chladni.apps.modal_channels import motions_of_one_unit
-from chladni.apps.modes import Band, Wanted
+from chladni.apps.live_grid import LiveGrid, LiveOptions
+from chladni.apps.live_modes import ModeLook, ModeLooks, Schedule
+from chladni.apps.modes import Band
 from chladni.io.live.door import LiveSamples, open_live
 from chladni.io.live.instrument import Instrument
 from chladni.io.live.reception import MessageSource, Samples
@@ -23,15 +22,14 @@ from chladni.signals.live_state import EventKind, LiveEvent, LiveState
 from chladni.signals.process_memory import trim_memory
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import near_matches
-from chladni.spectral.change_watch import ChangeWatch, SignalChange
-from chladni.spectral.running import TIME_CONSTANT_S, RunningAverages, running_segmentation
+from chladni.spectral.change_watch import SignalChange
+from chladni.spectral.running import TIME_CONSTANT_S
 from chladni.spectral.severity import Machine
 from chladni.spectral.windows import Window
 
 if TYPE_CHECKING:
     from chladni.robots.robot import Robot
     from chladni.robots.torque_residual import TorqueResidual
-    from chladni.signals.cross_spectra import CrossSpectra
 
 #: How long a source is waited for; a state comes at least as often while samples do.
 POLL_S: Final = 0.02
@@ -42,12 +40,8 @@ AVERAGES_EVERY_S: Final = 0.5
 MODES_EVERY_S: Final = 5.0
 #: How often memory that is free is given back to the system.
 TRIM_EVERY_S: Final = 60.0
-#: More channels than these, and modes of the present are looked for in the average over all.
-MOST_FADING: Final = 32
 #: Windows that wait to be compared with what is usual; a minute of them, or more.
 MOST_WINDOWS_WAITING: Final = 12
-#: Time constant of the averages from which modes of the present are taken.
-RECENT_S: Final = 20.0
 
 
 def live(
@@ -117,7 +111,7 @@ def live(
     ...     for event in state.events:
     ...         print(f"{event.time_s:.1f} s: {event.text}")
     """
-    options = _Options(
+    options = LiveOptions(
         references=None if references is None else as_names(references),
         band_hz=band_hz,
         resolution_hz=resolution_hz,
@@ -146,49 +140,18 @@ def live(
         session.close()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Options:
-    references: Sequence[str] | None
-    band_hz: Band | None
-    resolution_hz: float | None
-    window: Window
-    overlap: float
-    time_constant_s: float
-    modes_every_s: float
-    machine: Machine | None
-    robot: "Robot | None"
-
-    def __post_init__(self) -> None:
-        if not 0 < self.time_constant_s < float("inf"):
-            raise SetupError(f"time_constant_s is {self.time_constant_s}; it must be positive and finite")
-        if not 0 <= self.modes_every_s < float("inf"):
-            raise SetupError(f"modes_every_s is {self.modes_every_s}; it must be 0 (never) or more, and finite")
-
-
-@dataclass(slots=True, kw_only=True, eq=False)
-class _Grid:
-    """Averages of one sampling grid."""
-
-    averages: RunningAverages
-    watch: ChangeWatch
-    silent: tuple[str, ...] = ()
-    moved: set[str] = field(default_factory=set)
-    first: dict[str, float] = field(default_factory=dict)
-
-
 class _Session:
     """One run from the first sample to the last."""
 
-    def __init__(self, samples: LiveSamples, options: _Options) -> None:
+    def __init__(self, samples: LiveSamples, options: LiveOptions) -> None:
         self._samples = samples
         self._options = options
-        self._grids: dict[tuple[Channel, ...], _Grid] = {}
+        self._grids: dict[tuple[Channel, ...], LiveGrid] = {}
         self._spectra_due = Schedule(AVERAGES_EVERY_S)
         self._pairs_due = Schedule(2 * AVERAGES_EVERY_S)
         self._levels_due = Schedule(2 * AVERAGES_EVERY_S)
         self._trim_due = Schedule(TRIM_EVERY_S)
         self._torques: dict[tuple[Channel, ...], TorqueResidual | None] = {}
-        self._pairs: dict[tuple[Channel, ...], CrossSpectra] = {}
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="modes")
         self._looks = ModeLooks(self._worker, every_s=options.modes_every_s)
         self._judging: Future[tuple[SignalChange, ...]] | None = None
@@ -278,13 +241,7 @@ class _Session:
 
     def _average(self, block: TimeSeries) -> None:
         grid = self._grids.get(block.channels) or self._begin(block)
-        silent = tuple(name for name in self._samples.silent_channels if name in {one.name for one in block.channels})
-        if silent != grid.silent:
-            grid.silent = silent
-            grid.averages.leave_out(silent)
-        grid.averages.update(block)
-        _note_moving(grid, block)
-        self._tell_changes(grid.watch.take(block))
+        self._tell_changes(grid.take(block, self._samples.silent_channels))
 
     def _residual(self, block: TimeSeries) -> TimeSeries | None:
         """Torque that the robot's description doesn't explain; None for blocks that don't hold its joints."""
@@ -302,30 +259,10 @@ class _Session:
         torque = self._torques[block.channels]
         return None if torque is None else torque.take(block)
 
-    def _begin(self, block: TimeSeries) -> _Grid:
-        options = self._options
-        plan = running_segmentation(
-            block.sample_rate_hz,
-            channels=len(block.channels),
-            resolution_hz=options.resolution_hz,
-            window=options.window,
-            overlap=options.overlap,
-        )
-        pairs = len(block.channels) > 1 or options.modes_every_s > 0
-        fading = pairs and options.modes_every_s > 0 and len(block.channels) <= MOST_FADING
-        averages = RunningAverages(
-            block.channels,
-            block.sample_rate_hz,
-            plan,
-            pairs=pairs,
-            fading_pairs_s=max(RECENT_S, options.time_constant_s) if fading else None,
-            bands_hz=None if options.band_hz is None else [options.band_hz],
-            time_constant_s=options.time_constant_s,
-            machine=options.machine,
-        )
-        for note in averages.notes:
+    def _begin(self, block: TimeSeries) -> LiveGrid:
+        grid = LiveGrid(block.channels, block.sample_rate_hz, self._options)
+        for note in grid.averages.notes:
             self._tell("note", note, None)
-        grid = _Grid(averages=averages, watch=ChangeWatch(block.channels, block.sample_rate_hz, plan))
         self._grids[block.channels] = grid
         return grid
 
@@ -344,77 +281,65 @@ class _Session:
     # --- averages ---
 
     def _renew(self, *, ended: bool) -> bool:
-        """Renew what it's time for; at the end, all."""
-        fresh = False
-        if self._grids and (ended or self._spectra_due.due):
-            fresh = self._timed(self._spectra_due, lambda: self._renew_spectra(ended))
-        if self._grids and (ended or self._levels_due.due):
-            self._timed(self._levels_due, lambda: self._renew_levels(ended))
-        if self._grids and (ended or self._pairs_due.due):
-            self._timed(self._pairs_due, lambda: self._renew_response(ended))
-        if self._grids and self._options.modes_every_s > 0:
+        """Renew what it's time for; at the end, all. Give whether spectra are fresh."""
+        if not self._grids:
+            return False
+        fresh = self._in_turn(self._spectra_due, self._renew_spectra, ended=ended)
+        self._in_turn(self._levels_due, self._renew_levels, ended=ended)
+        self._in_turn(self._pairs_due, self._renew_response, ended=ended)
+        if self._options.modes_every_s > 0:
             self._renew_modes(ended=ended)
         return fresh
 
-    def _timed(self, schedule: Schedule, work: Any) -> bool:
+    def _in_turn(self, schedule: Schedule, renew: Callable[[bool], None], *, ended: bool) -> bool:
+        """Renew something if it's time; give whether it was."""
+        if not (ended or schedule.due):
+            return False
         begun_s = time.monotonic()
-        done = bool(work())
+        renew(ended)
         schedule.done(time.monotonic() - begun_s)
-        return done
+        return True
 
-    def _renew_spectra(self, ended: bool) -> bool:
+    @contextmanager
+    def _waiting_for_more(self, ended: bool) -> Iterator[None]:
+        """Leave out what can't be estimated yet; at the end it's told."""
+        try:
+            yield
+        except EstimateError as error:
+            if ended:
+                self._once(str(error))
+
+    def _renew_spectra(self, ended: bool) -> None:
         found: dict[str, list[Any]] = {name: [] for name in ("densities", "exponential", "peak_hold", "waterfalls")}
         for channels, grid in self._grids.items():
             rate_hz = self._samples.rate_hz(channels, fitted=ended)
             averages = grid.averages
-            try:
+            with self._waiting_for_more(ended):
                 found["densities"] += averages.densities("linear", sample_rate_hz=rate_hz)
                 found["exponential"] += averages.densities("exponential", sample_rate_hz=rate_hz)
                 found["peak_hold"] += averages.densities("peak-hold", sample_rate_hz=rate_hz)
                 found["waterfalls"].append(averages.waterfall(sample_rate_hz=rate_hz))
-            except EstimateError as error:
-                if ended:
-                    self._once(str(error))
         self._values |= {name: tuple(some) for name, some in found.items()}
-        return True
 
-    def _renew_levels(self, ended: bool) -> bool:
+    def _renew_levels(self, ended: bool) -> None:
         found: dict[str, list[Any]] = {"levels": [], "severities": []}
         for grid in self._grids.values():
             averages = grid.averages
-            try:
+            with self._waiting_for_more(ended):
                 found["levels"].append(averages.levels())
                 severity = averages.severity()
                 found["severities"] += [] if severity is None else [severity]
-            except EstimateError as error:
-                if ended:
-                    self._once(str(error))
         self._values |= {name: tuple(some) for name, some in found.items()}
-        return True
 
-    def _renew_response(self, ended: bool) -> bool:
+    def _renew_response(self, ended: bool) -> None:
+        for_modes = self._options.modes_every_s > 0 and (ended or self._looks.due)
         for channels, grid in self._grids.items():
-            names = self._references(channels, grid)
-            looked_at = self._options.modes_every_s > 0 and (ended or self._looks.due)
-            if not looked_at and (not names or len(names) == len(channels)):
+            if not (for_modes or grid.responds):
                 continue
-            try:
-                spectra = grid.averages.spectra(sample_rate_hz=self._samples.rate_hz(channels, fitted=ended))
-                self._pairs[channels] = spectra
-                held = {channel.name for channel in spectra.channels}
-                if names and set(names) <= held and len(held) > len(names):
-                    response, coherent = grid.averages.response(names, spectra=spectra)
-                    self._values |= {"response": response, "coherence": coherent}
-            except EstimateError as error:
-                if ended:
-                    self._once(str(error))
-        return True
-
-    def _references(self, channels: Sequence[Channel], grid: _Grid) -> tuple[str, ...]:
-        known = {channel.name for channel in channels}
-        if self._options.references is not None:
-            return tuple(name for name in self._options.references if name in known)
-        return excitations([channel for channel in channels if channel.name in grid.moved])
+            with self._waiting_for_more(ended):
+                found = grid.response(self._samples.rate_hz(channels, fitted=ended))
+                if found is not None:
+                    self._values |= dict(zip(("response", "coherence"), found, strict=True))
 
     # --- modes ---
 
@@ -423,41 +348,18 @@ class _Session:
             self._enter(look)
         if not (ended or self._looks.due):
             return
-        channels, grid = max(self._grids.items(), key=lambda item: len(item[0]))
-        try:
-            job = self._job(channels, grid)
-        except EstimateError as error:
-            if ended:
-                self._once(str(error))
-            return
+        grid = max(self._grids.values(), key=lambda one: len(one.channels))
+        job = None
+        with self._waiting_for_more(ended):
+            job, notes = grid.mode_job(self._time_s)
+            for note in notes:
+                self._once(note)
         if job is None:
             return
         if ended:
             self._enter(job.look())
         else:
             self._looks.begin(job)
-
-    def _job(self, channels: Sequence[Channel], grid: _Grid) -> ModeJob | None:
-        """Averages of the responses, as they are now; None where there are no responses, or no new averages."""
-        references = self._references(channels, grid)
-        answers = [
-            channel
-            for channel in channels
-            if channel.name in grid.moved and channel.name not in references and channel.unit not in FORCE_UNITS
-            and channel.name not in grid.silent
-        ]  # fmt: skip
-        names, notes = motions_of_one_unit(answers, named=False)
-        if not names:
-            return None
-        for note in notes:
-            self._once(note)
-        if (spectra := self._pairs.pop(tuple(channels), None)) is None:
-            return None
-        whole = spectra.select(names)
-        recent = whole if len(channels) > MOST_FADING else grid.averages.recent_spectra().select(names)
-        band_hz = self._options.band_hz
-        wanted = Wanted.of(bands_hz=None if band_hz is None else [band_hz], count=None, frequencies_hz=None)
-        return ModeJob(whole=whole, recent=recent, wanted=wanted, time_s=self._time_s)
 
     def _enter(self, look: ModeLook) -> None:
         if look.whole is not None:
@@ -486,18 +388,6 @@ class _Session:
             ended=ended,
             **self._values,
         )
-
-
-def _note_moving(grid: _Grid, block: TimeSeries) -> None:
-    """Remember which channels showed more than one value."""
-    if len(grid.moved) == len(block.channels):
-        return
-    for channel, row in zip(block.channels, block.values, strict=True):
-        if channel.name in grid.moved:
-            continue
-        known = row[row == row]  # NaN is missing
-        if known.size and (known.min() < known.max() or grid.first.setdefault(channel.name, known[0]) != known[0]):
-            grid.moved.add(channel.name)
 
 
 def _robot(given: "Robot | Path | str | None") -> "Robot | None":
