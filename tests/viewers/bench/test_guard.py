@@ -207,11 +207,13 @@ def test_a_page_that_is_closed_makes_room_at_once(server: Any, port: int, monkey
 def test_a_browser_that_leaves_at_once_leaves_no_page(server: Any, port: int) -> None:
     for _ in range(2):
         token = wire.ask(port, f"/{NAME}").token
+        assert server.open_pages == 1
         with wire.connect(port) as connection:
             # Gone before the server has noticed that it came.
             connection.sendall(wire.request(port, f"/{NAME}/ws", *wire.upgrade_lines(token, own(port))))
             connection.sendall(wire.frame(b"", 8))
-    until(lambda: server.open_pages == 0)
+        until(lambda: server.open_pages == 0)
+        assert wire.ask(port, f"/{NAME}/ws", *wire.upgrade_lines(token, own(port))).status == 403
 
 
 @pytest.mark.parametrize("token", ["", "none", "e30", "a.b", "eyJ9", "x" * 2000])
@@ -425,13 +427,17 @@ def test_a_link_from_another_page_leads_to_the_bench(server: Any, port: int) -> 
 
 
 @needs_chromium
-def test_a_full_bench_opens_the_page_once_there_is_room(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_bench_opens_the_page_once_there_is_room(
+    server: Any, port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("chladni.viewers.bench.guard.MOST_PAGES", 1)
     with browsing() as page, join(port, wire.ask(port, f"/{NAME}").token):
         page.goto(f"{own(port)}/{NAME}")
         page.get_by_text("1 open pages, the most there can be").wait_for()
+        assert server.open_pages == 1
         monkeypatch.setattr("chladni.viewers.bench.guard.MOST_PAGES", 2)
         page.locator(".noUi-handle").first.wait_for()
+        assert server.open_pages == 2
 
 
 @needs_chromium
