@@ -60,7 +60,7 @@ class Generator:
         """The rate is exact."""
         return None
 
-    def receive(self, timeout_s: float) -> Samples:  # noqa: ARG002  # it never waits
+    def receive(self, _timeout_s: float) -> Samples:
         """Give the next block."""
         if self.number >= self.blocks:
             return Samples(ended=True)

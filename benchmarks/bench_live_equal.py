@@ -103,7 +103,7 @@ class Played(Instrument):
     def start(self) -> None:
         """Nothing is to be done."""
 
-    def read(self, timeout_s: float) -> Taken | None:  # noqa: ARG002
+    def read(self, _timeout_s: float) -> Taken | None:
         """Give a quarter of a second."""
         if self._next >= self._series.samples:
             return None

@@ -93,7 +93,7 @@ class Pieces(MessageSource):
         """Channels so far."""
         return self._stream.channels
 
-    def receive(self, timeout_s: float) -> Reception:  # noqa: ARG002
+    def receive(self, _timeout_s: float) -> Reception:
         """Give the next piece."""
         if self._stall is not None and self._place > self._stall:
             self._stall = None

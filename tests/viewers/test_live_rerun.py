@@ -142,16 +142,23 @@ def test_a_slow_viewer_holds_nothing_up_and_what_it_lacks_is_told() -> None:
 
 
 class Closed(Slow):
-    """A viewer that somebody closed."""
+    """A viewer that somebody closed, or that has a defect."""
 
-    def draw(self, states: Sequence[LiveState]) -> None:  # noqa: ARG002  # nothing is drawn
-        raise OSError("it was closed")
+    def __init__(self, error: Exception) -> None:
+        super().__init__()
+        self._error = error
+
+    def draw(self, _states: Sequence[LiveState]) -> None:
+        raise self._error
 
 
-def test_a_viewer_that_was_closed_is_told_once() -> None:
-    painter = Painter(Closed())
+@pytest.mark.parametrize(
+    ("error", "why"), [(OSError("it was closed"), "it was closed"), (TypeError("no text"), "TypeError: no text")]
+)
+def test_a_viewer_that_fails_is_told_once_and_the_averages_go_on(error: Exception, why: str) -> None:
+    painter = Painter(Closed(error))
     told = []
     for state in states(20):
         told += painter.show(state)
         time.sleep(0.005)
-    assert told + list(painter.close()) == ["the viewer ended: it was closed; the averages go on without it"]
+    assert told + list(painter.close()) == [f"the viewer ended: {why}; the averages go on without it"]

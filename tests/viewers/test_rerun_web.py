@@ -30,7 +30,11 @@ def listening(pid: int) -> list[tuple[str, int]]:
 def test_page_is_served_at_the_address(served: WebViewer) -> None:
     assert served.address.startswith("http://127.0.0.1:")
     with urllib.request.urlopen(served.address, timeout=20) as answer:  # noqa: S310  # our own loopback server
-        assert b"<html" in answer.read()
+        page = answer.read()
+    assert b"<html" in page
+    # Colours are for a dark ground, whatever the system prefers; the page asks for it by this name.
+    assert parse_qs(urlsplit(served.address).query)["theme"] == ["dark"]
+    assert b'query.get("theme")' in page
 
 
 def test_every_socket_listens_on_loopback_only(served: WebViewer) -> None:

@@ -38,7 +38,7 @@ class LiveSamples(Protocol):
     def rate_hz(self, channels: Sequence[Channel], *, fitted: bool = True) -> float | None:
         """Rate of a grid, given by its channels, as it's known by now."""
 
-    def receive(self, timeout_s: float) -> Samples:
+    def receive(self, timeout_s: float, /) -> Samples:
         """Give the blocks that are complete, at the latest after `timeout_s`."""
 
     def finish(self) -> Samples:

@@ -59,7 +59,7 @@ class Instrument(ABC):
         """Begin to take samples."""
 
     @abstractmethod
-    def read(self, timeout_s: float) -> Taken | None:
+    def read(self, timeout_s: float, /) -> Taken | None:
         """Give the next samples, none when `timeout_s` has passed without any; None when there won't be more."""
 
     @abstractmethod

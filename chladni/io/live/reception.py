@@ -87,7 +87,7 @@ class MessageSource(ABC):
         """Channels of messages known so far, by id; more may come, none goes."""
 
     @abstractmethod
-    def receive(self, timeout_s: float) -> Reception:
+    def receive(self, timeout_s: float, /) -> Reception:
         """Give what has come, at the latest after `timeout_s`, which may be nothing."""
 
     @abstractmethod

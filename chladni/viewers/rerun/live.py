@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, floor
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import rerun as rr
@@ -25,7 +25,7 @@ from chladni.viewers.rerun.drawing import APPLICATION
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.lifetimes import send_blueprint
 from chladni.viewers.rerun.live_waterfalls import LiveWaterfalls
-from chladni.viewers.rerun.timelines import TIME, send_scalars, time_index
+from chladni.viewers.rerun.timelines import TIME, log_at, send_scalars, time_index
 from chladni.viewers.style import Style
 
 #: Seconds of waveform that are seen at a time.
@@ -116,7 +116,9 @@ class LiveDrawing:
         before = len(self._parts) + len(self._grids) + self._falls.count
         self._note_channels(state)
         for event in state.events:
-            self._log("/events", event.time_s, rr.TextLog(visible(event.text), level=_level(event.kind)))
+            log_at(
+                self._recording, "/events", event.time_s, rr.TextLog(visible(event.text), level=_level(event.kind))
+            )
         for series in state.series:
             self._waveforms(series)
         if curves and state.fresh and (state.time_s - self._curves_s >= CURVES_EVERY_S or state.ended):
@@ -260,7 +262,8 @@ class LiveDrawing:
             for first, last in _known_runs(curve):
                 strips.append(canvas.places(places[first:last], curve[first:last]))
                 chosen.append((*colour, alpha))
-        self._log(
+        log_at(
+            self._recording,
             path,
             time_s,
             rr.LineStrips2D(strips, colors=chosen or None, radii=rr.Radius.ui_points(width), draw_order=5.0),
@@ -286,9 +289,9 @@ class LiveDrawing:
                 look = rr.SeriesPoints(names=f"mode {mode.number}", marker_sizes=3.0)
                 self._recording.log(path, look, static=True)
             if mode.missed == 0:
-                self._log(path, mode.last_s, rr.Scalars(mode.frequency_hz))
+                log_at(self._recording, path, mode.last_s, rr.Scalars(mode.frequency_hz))
         text = rr.TextDocument(_mode_table(state.tracked), media_type=rr.MediaType.MARKDOWN)
-        self._log("/mode_table", state.time_s, text)
+        log_at(self._recording, "/mode_table", state.time_s, text)
 
     # --- writing ---
 
@@ -302,10 +305,6 @@ class LiveDrawing:
             )
             self._recording.log(path, lines, static=True)
         send_scalars(self._recording, path, time_index(_ns(time_s)), values[np.newaxis])
-
-    def _log(self, path: str, time_s: float, entity: Any) -> None:
-        self._recording.set_time(TIME, duration=time_s)
-        self._recording.log(path, entity)
 
     # --- arrangement ---
 

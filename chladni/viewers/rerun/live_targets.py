@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, TYPE_CHECKING, Final, Self
-from urllib.parse import quote
 from uuid import uuid4
 
 import rerun as rr
@@ -22,7 +21,7 @@ from chladni.signals.live_state import LiveState
 from chladni.viewers.rerun.drawing import APPLICATION
 from chladni.viewers.rerun.lifetimes import end_unused_streams
 from chladni.viewers.rerun.live import LiveDrawing, rehearse
-from chladni.viewers.rerun.process import LOOPBACK, free_port, start, stop
+from chladni.viewers.rerun.process import LOOPBACK, free_port, page_address, start, stop
 
 if TYPE_CHECKING:
     from subprocess import Popen
@@ -61,7 +60,7 @@ class Target(ABC):
         """Do what takes long the first time."""
 
     @abstractmethod
-    def draw(self, states: Sequence[LiveState]) -> None:
+    def draw(self, states: Sequence[LiveState], /) -> None:
         """Draw the states that wait, and send them on."""
 
     @abstractmethod
@@ -237,8 +236,7 @@ class Viewer(Target):
         if web:
             options += ["--serve-web", "--web-viewer-port", str(page_port), "--server-memory-limit", "512MB"]
             ports.append(page_port)
-            data = quote(f"rerun+http://{LOOPBACK}:{data_port}/proxy", safe="")
-            self.address = f"http://{LOOPBACK}:{page_port}/?url={data}"
+            self.address = page_address(page_port, data_port)
         self._process: Popen[bytes] = start(options, ports=ports, detached=not web, settle_s=0.0 if web else 1.0)
         self._web = web
         self._recording = live_recording(str(uuid4()))

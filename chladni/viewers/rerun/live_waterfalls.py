@@ -17,7 +17,7 @@ from chladni.viewers.drawing import block_maximum, decibels_of_power, ticks
 from chladni.viewers.labels import decibel_unit
 from chladni.viewers.rerun.canvas import LABEL_COLOUR, Canvas
 from chladni.viewers.rerun.entities import folder
-from chladni.viewers.rerun.timelines import TIME
+from chladni.viewers.rerun.timelines import log_at
 from chladni.viewers.style import Style, amplitude_colours
 
 #: How often each picture is redrawn, in seconds of the source: pictures weigh more than curves.
@@ -33,13 +33,7 @@ _COLOURS: Final = amplitude_colours(np.linspace(0.0, 1.0, 256))
 
 
 class LiveWaterfalls:
-    """Draws the waterfalls of one source, one picture at a time, so that none holds up the waveforms.
-
-    Parameters
-    ----------
-    recording
-        Where to.
-    """
+    """Draws the waterfalls of one source, one picture at a time, so that none holds up the waveforms."""
 
     def __init__(self, recording: rr.RecordingStream) -> None:
         self._recording = recording
@@ -80,15 +74,16 @@ class LiveWaterfalls:
         high = float(np.percentile(known, 99.9))
         share = np.nan_to_num(np.clip((levels - high) / SPAN_DB + 1, 0.0, 1.0))
         picture = _COLOURS[_resized((255 * share).astype(np.uint8), PICTURE)]
-        self._log(f"{path}/picture", time_s, rr.EncodedImage(contents=_jpeg(picture), media_type="image/jpeg"))
+        log_at(
+            self._recording,
+            f"{path}/picture",
+            time_s,
+            rr.EncodedImage(contents=_jpeg(picture), media_type="image/jpeg"),
+        )
         canvas = _canvas(fall, (fall.start_time_ns - origin_ns) / NS_PER_S)
-        self._log(f"{path}/axes", time_s, _axes(canvas))
+        log_at(self._recording, f"{path}/axes", time_s, _axes(canvas))
         if path not in self._views:
             self._views[path] = canvas.view(path, _title(fall.channels[row], style))
-
-    def _log(self, path: str, time_s: float, entity: Any) -> None:
-        self._recording.set_time(TIME, duration=time_s)
-        self._recording.log(path, entity)
 
 
 def _title(channel: Channel, style: Style) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO
+from urllib.parse import quote
 
 import rerun as rr
 
@@ -39,6 +40,12 @@ code = program.wait()
 # Not by way of the interpreter's end, which waits for timers.
 os._exit(code if code >= 0 else 128 - code)
 """
+
+
+def page_address(page_port: int, data_port: int) -> str:
+    """Give the address of rerun's page that shows what comes to a port; dark, for which our colours are chosen."""
+    data = quote(f"rerun+http://{LOOPBACK}:{data_port}/proxy", safe="")
+    return f"http://{LOOPBACK}:{page_port}/?url={data}&theme=dark"
 
 
 def start(

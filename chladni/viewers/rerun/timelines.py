@@ -43,6 +43,12 @@ def motion_index(period: Whole, phase_deg: Whole) -> dict[str, Whole]:
     return {TIME: np.rint((360 * period + phase_deg) * ns_per_degree).astype(np.int64)}
 
 
+def log_at(recording: rr.RecordingStream, path: str, time_s: float, entity: rr.AsComponents) -> None:
+    """Write an archetype at so many seconds of the study."""
+    recording.set_time(TIME, duration=time_s)
+    recording.log(path, entity)
+
+
 def send_columns(
     recording: rr.RecordingStream,
     path: str,

@@ -4,11 +4,10 @@ from functools import partial
 from subprocess import Popen
 from types import TracebackType
 from typing import Self
-from urllib.parse import quote
 
 from chladni.signals.study import Study
 from chladni.viewers.rerun.drawing import draw
-from chladni.viewers.rerun.process import LOOPBACK, Drawing, free_port, send, start, stop
+from chladni.viewers.rerun.process import Drawing, free_port, page_address, send, start, stop
 
 
 class WebViewer:
@@ -77,10 +76,9 @@ def serve_drawing(drawing: Drawing, *, port: int = 0) -> WebViewer:
     page_port = port or free_port()
     options = ["--serve-web", "--port", str(data_port), "--web-viewer-port", str(page_port)]
     process = start(options, ports=[data_port, page_port], detached=False)
-    data = quote(f"rerun+http://{LOOPBACK}:{data_port}/proxy", safe="")
     try:
         send(drawing, data_port)
     except BaseException:
         stop(process)
         raise
-    return WebViewer(f"http://{LOOPBACK}:{page_port}/?url={data}", process)
+    return WebViewer(page_address(page_port, data_port), process)

@@ -58,7 +58,7 @@ class Bits(MessageSource):
     def channels(self) -> Any:
         return self._stream.channels
 
-    def receive(self, timeout_s: float) -> Reception:  # noqa: ARG002  # there is nothing to wait for
+    def receive(self, _timeout_s: float) -> Reception:
         part = next(self._parts, None)
         return self._stream.finish() if part is None else self._stream.feed(part)
 

@@ -35,7 +35,7 @@ class Made(Instrument):
     def start(self) -> None:
         self.started = True
 
-    def read(self, timeout_s: float) -> Taken | None:  # noqa: ARG002
+    def read(self, _timeout_s: float) -> Taken | None:
         time.sleep(self._pause_s)
         if not self._blocks.empty():
             return self._blocks.get()
