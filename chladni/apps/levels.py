@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chladni.apps.documents import Document, finite, plain
-from chladni.apps.sources import Progress, Span, Watched, no_progress, still_note, watched_grids
+from chladni.apps.sources import Progress, Span, Watched, no_progress, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import EstimateError
@@ -80,7 +80,7 @@ def measure_levels(
             notes.append(f"{some_of(grid.names)}: {error}")
             continue
         constant = set() if channels is not None else set(grid.constant())
-        notes += still_note(grid.constant()) if channels is not None else ()
+        notes += grid.still_note(grid.names) if channels is not None else ()
         if constant:
             notes.append(f"channels that never change are left out: {some_of(sorted(constant))}")
         moving = [channel.name for channel in found.channels if channel.name not in constant]

@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import chain
 from typing import Any
 
-from chladni.apps.sources import Progress, Span, Watched, no_progress, still_note, watched_grids
+from chladni.apps.sources import Progress, Span, Watched, moving_only, no_progress, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import EstimateError
@@ -56,11 +56,11 @@ def shock_responses(
             f"{log.path.name}: no channel is an acceleration; units are {some_of(sorted(units))}: name a channel "
             "(--channel), or give its unit in a setup file (--setup)"
         )
-    if channels is not None:
-        return tuple(_told_still(one, grid) for one, grid in found)
     # Of channels that never change each oscillator stays at rest.
-    moving = tuple(part for one, grid in found if (part := _moving(one, grid)) is not None)
-    return moving or tuple(_told_still(one, grid) for one, grid in found)
+    moving = () if channels is not None else moving_only(found)
+    return moving or tuple(
+        replace(one, notes=(*one.notes, *grid.still_note([c.name for c in one.channels]))) for one, grid in found
+    )
 
 
 def _of_grid(blocks: Iterator[TimeSeries], duration_s: float, options: dict[str, Any]) -> ShockResponse:
@@ -71,22 +71,3 @@ def _of_grid(blocks: Iterator[TimeSeries], duration_s: float, options: dict[str,
     if options.get("band_hz") is None:
         options = options | {"band_hz": (1 / duration_s, first.sample_rate_hz / RATE_OVER_HIGHEST)}
     return srs(chain((first, second), blocks), **options)
-
-
-def _moving(found: ShockResponse, grid: Watched) -> ShockResponse | None:
-    still = set(grid.constant())
-    rows = [row for row, channel in enumerate(found.channels) if channel.name not in still]
-    if not rows:
-        return None
-    return replace(
-        found,
-        positive=found.positive[rows],
-        negative=found.negative[rows],
-        offset=found.offset[rows],
-        channels=tuple(found.channels[row] for row in rows),
-    )
-
-
-def _told_still(found: ShockResponse, grid: Watched) -> ShockResponse:
-    still = set(grid.constant())
-    return replace(found, notes=(*found.notes, *still_note([c.name for c in found.channels if c.name in still])))

@@ -1,10 +1,10 @@
 """Samples of a log for averaging: whole when they fit in memory, block by block when they don't."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite
-from typing import Protocol
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from chladni.io.log_reader import MostlyEmptyError
 from chladni.io.shared_grid import SampleGrid, several_grids
 from chladni.io.source import block_seconds, is_small
 from chladni.signals.arrays import Real
+from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
 from chladni.signals.resampling import JoinMethod, join_note, join_resampled
 from chladni.signals.time_series import TimeSeries
@@ -56,14 +57,6 @@ def moving_channels(series: TimeSeries) -> list[str]:
     return [one.name for one, low, high in zip(series.channels, lowest, highest, strict=True) if low < high]
 
 
-def still_note(still: Sequence[str]) -> tuple[str, ...]:
-    """Say that channels that were asked for never change; nothing where all do."""
-    if not still:
-        return ()
-    verb = "never changes" if len(still) == 1 else "never change"
-    return (f"{some_of(list(still))} {verb}: zeros are for want of motion, as of a sensor that isn't connected",)
-
-
 class Watched:
     """Passes blocks on, and remembers which channels moved at all, by how much, and how far it is."""
 
@@ -97,6 +90,14 @@ class Watched:
         """Names of the channels that showed one value only."""
         return tuple(name for name in self._lowest if not self._lowest[name] < self._highest[name])
 
+    def still_note(self, names: Collection[str]) -> tuple[str, ...]:
+        """Say which of these channels never change; nothing where all do."""
+        still = [name for name in self.constant() if name in names]
+        if not still:
+            return ()
+        verb = "never changes" if len(still) == 1 else "never change"
+        return (f"{some_of(still)} {verb}: zeros are for want of motion, as of a sensor that isn't connected",)
+
     def variance(self, name: str) -> float:
         """Variance of a channel over all its samples; 0 before any came."""
         samples, _, squares = self._moments.get(name, (0, 0.0, 0.0))
@@ -129,6 +130,25 @@ class Watched:
             self._highest[channel.name] = max(high, self._highest.get(channel.name, -np.inf))
         for channel, row in zip(block.channels, block.values, strict=True):
             self._moments[channel.name] = _with_moments(self._moments.get(channel.name, _NOTHING), row)
+
+
+class _Spectrum(Protocol):
+    @property
+    def channels(self) -> tuple[Channel, ...]: ...
+    def select(self, names: Sequence[str], /) -> Self: ...
+
+
+_SpectrumT = TypeVar("_SpectrumT", bound=_Spectrum)
+
+
+def moving_only(found: Iterable[tuple[_SpectrumT, Watched]]) -> tuple[_SpectrumT, ...]:
+    """Give what was found of channels that change; what holds none of them is left out."""
+    kept = []
+    for one, grid in found:
+        still = set(grid.constant())
+        if names := [channel.name for channel in one.channels if channel.name not in still]:
+            kept.append(one.select(names))
+    return tuple(kept)
 
 
 _Moments = tuple[float, float, float]

@@ -1,6 +1,6 @@
 """Power spectral densities and transfer functions of a log or a series, in one call each."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeVar, cast
@@ -13,9 +13,9 @@ from chladni.apps.sources import (
     Progress,
     Span,
     Watched,
+    moving_only,
     no_progress,
     on_one_grid,
-    still_note,
     watched_grids,
 )
 from chladni.io.log import Log
@@ -291,8 +291,7 @@ def transfer(
         spectra = replace(spectra, provenance=spectra.provenance.with_notes(*grid.notes))
         _require_moving(grid, references)
         spectra = without_constant(spectra, grid, keep=(*references, *(named or ())))
-        still = [name for name in grid.constant() if name in (named or ())]
-        spectra = replace(spectra, provenance=spectra.provenance.with_notes(*still_note(still)))
+        spectra = replace(spectra, provenance=spectra.provenance.with_notes(*grid.still_note(named or ())))
         return frequency_response(
             spectra, references=references, responses=named, estimator=estimator, hammer_range=hammer_range
         )
@@ -344,30 +343,17 @@ def zoomed(
     EstimateError
         As `zoom_spectrum` does.
     """
-    found = []
+    found: list[tuple[AmplitudeSpectrum, Watched]] = []
     for grid in watched_grids(log, channels, span, progress=progress):
         try:
-            found.append((zoom_of_blocks(partial(iter, grid), **options), set(grid.constant())))
+            found.append((zoom_of_blocks(partial(iter, grid), **options), grid))
         except EstimateError as error:
             raise EstimateError(f"{log.path.name}: {error}") from error
-    if channels is None:
-        moving = tuple(one for spectrum, still in found if (one := _without(spectrum, still)) is not None)
-        if moving:
-            return moving
-    return tuple(_told_still(spectrum, still) for spectrum, still in found)
-
-
-def _without(found: AmplitudeSpectrum, still: Collection[str]) -> AmplitudeSpectrum | None:
-    rows = [row for row, channel in enumerate(found.channels) if channel.name not in still]
-    if not rows:
-        return None
-    channels = tuple(found.channels[row] for row in rows)
-    return replace(found, values=found.values[rows], std=found.std[rows], channels=channels)
-
-
-def _told_still(found: AmplitudeSpectrum, still: Collection[str]) -> AmplitudeSpectrum:
-    note = still_note([channel.name for channel in found.channels if channel.name in still])
-    return replace(found, provenance=found.provenance.with_notes(*note))
+    moving = () if channels is not None else moving_only(found)
+    return moving or tuple(
+        replace(one, provenance=one.provenance.with_notes(*grid.still_note([c.name for c in one.channels])))
+        for one, grid in found
+    )
 
 
 def _told_excitations(source: Log | TimeSeries, span: Span) -> tuple[str, ...]:

@@ -1,12 +1,12 @@
 """Shock response spectra: how far a shock drives oscillators of every frequency."""
 
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
 from chladni.signals.arrays import Real
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, Names, find_channels
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value, of_channel, require_frequency_axis, require_shape
 
@@ -61,6 +61,17 @@ class ShockResponse(Value):
         require_shape("negative", self.negative, expected, "channels x frequencies")
         require_shape("offset", self.offset, expected[:1], "channels")
         self._freeze()
+
+    def select(self, names: Names) -> Self:
+        """Give the responses to the named channels; `EstimateError` naming those there are when one is missing."""
+        rows = find_channels(self.channels, names)
+        return replace(
+            self,
+            positive=self.positive[rows],
+            negative=self.negative[rows],
+            offset=self.offset[rows],
+            channels=tuple(self.channels[row] for row in rows),
+        )
 
     @property
     def maximax(self) -> Real:

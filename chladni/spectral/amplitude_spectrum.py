@@ -1,13 +1,13 @@
 """Amplitude spectra from averaged cross-spectra."""
 
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
 from chladni.io.source import Blocks, SeriesLike
 from chladni.signals.arrays import Real
-from chladni.signals.channel import Channel, Names
+from chladni.signals.channel import Channel, Names, find_channels
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import SetupError
 from chladni.signals.provenance import Provenance
@@ -59,6 +59,12 @@ class AmplitudeSpectrum(Value):
         require_shape("values", self.values, expected, "channels x frequencies")
         require_shape("std", self.std, expected, "channels x frequencies")
         self._freeze()
+
+    def select(self, names: Names) -> Self:
+        """Give the amplitudes of the named channels; `EstimateError` naming those there are when one is missing."""
+        rows = find_channels(self.channels, names)
+        channels = tuple(self.channels[row] for row in rows)
+        return replace(self, values=self.values[rows], std=self.std[rows], channels=channels)
 
 
 @renamed(spectra="source")

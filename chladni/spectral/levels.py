@@ -291,11 +291,8 @@ class _Windows:
         other.number, other.moments = number, _Moments._make(moments)
         for one in (self, other):
             one.coarsen(max(self.samples, size))
-        self.moments = _Moments.joined([self.moments, other.moments], lambda arrays: np.concatenate(arrays, axis=-1))
-        self.number = np.concatenate([self.number, other.number])
-        self.coarsen(self.samples)
-        while self.number.size > MOST_WINDOWS:
-            self.coarsen(2 * self.samples)
+        self._fresh.append((other.number, other.moments))
+        self.join()
 
     def coarsen(self, samples: int) -> None:
         """Join windows to those of so many samples, a multiple of what they have."""

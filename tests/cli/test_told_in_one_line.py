@@ -43,6 +43,18 @@ def test_a_channel_that_never_changes_is_told(run: Run, log: Path, arguments: tu
 
 
 @pytest.mark.parametrize(
+    ("arguments", "moving"), [(("srs",), ("m.a",)), (("zoom", "--band", "40-60"), ("m.a", "m.speed"))]
+)
+def test_of_all_channels_one_that_never_changes_is_left_out(
+    run: Run, log: Path, arguments: tuple[str, ...], moving: tuple[str, ...]
+) -> None:
+    every = run(arguments[0], log, *arguments[1:])
+    named = run(arguments[0], log, *arguments[1:], *(word for name in moving for word in ("--channel", name)))
+    assert (every.code, "dead" in every.out) == (0, False)
+    assert every.out == named.out
+
+
+@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (

@@ -45,6 +45,15 @@ def half_sine_response(natural_hz, q):
     return place, -(2 * zeta * omega * speed + omega**2 * place)
 
 
+def test_named_channels_are_selected_with_their_rows():
+    x = noise(3, 1000) + np.arange(3.0)[:, np.newaxis]
+    chosen = srs(series(x, rate_hz=RATE_HZ)).select(["c", "a"])
+    alone = srs(series(x, rate_hz=RATE_HZ).select(["c", "a"]))
+    assert chosen.channels == alone.channels
+    for name in ("positive", "negative", "offset"):
+        np.testing.assert_array_equal(getattr(chosen, name), getattr(alone, name))
+
+
 @pytest.mark.parametrize("q", [10.0, 50.0])
 def test_a_half_sine_has_the_spectrum_of_the_closed_form(q):
     found = srs(series(pulse(), rate_hz=RATE_HZ), q=q, frequencies_hz=FREQUENCY_HZ)

@@ -23,6 +23,15 @@ def test_on_the_lines_of_the_transform_it_is_the_transform():
     np.testing.assert_allclose(rms.values, plain / np.sqrt(2), atol=1e-12)
 
 
+def test_named_channels_are_selected_with_their_rows():
+    found = zoom_spectrum(series(noise(3, 1000), rate_hz=RATE_HZ), band_hz=(100.0, 200.0), lines=11)
+    chosen = found.select(["c", "a"])
+    assert [channel.name for channel in chosen.channels] == ["c", "a"]
+    np.testing.assert_array_equal(chosen.values, found.values[[2, 0]])
+    with pytest.raises(EstimateError, match="no channel 'd'"):
+        found.select(["d"])
+
+
 def test_two_close_tones_are_parted_and_read():
     t = np.arange(20_000) / RATE_HZ
     pair = 1.5 * np.cos(2 * np.pi * 100.03 * t) + 0.4 * np.cos(2 * np.pi * 100.55 * t + 1) + 9.81
