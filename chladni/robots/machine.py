@@ -225,31 +225,35 @@ def as_described(robot: Robot) -> Machine:
 
 
 def physical(described: Real, wanted: Real) -> Real:
-    """Go from the described inertial numbers of a link as far to the wanted ones as a body can have.
+    """Give the inertial numbers nearest to the wanted ones that a body of their mass and centre can have.
 
     A body can have numbers whose pseudo-inertia ``[[S, h], [h', m]]``, S the second moments of its mass, is positive
-    semi-definite (Wensing, Kim & Slotine 2018); what is described counts as such, but for rounding.
+    semi-definite (Wensing, Kim & Slotine 2018): those are S about the centre without negative eigenvalues. Mass and
+    centre, which gravity tells of, stay.
 
     Parameters
     ----------
     described, wanted
-        ``[10]``.
+        ``[10]``; what is described counts as a body, but for rounding.
     """
+    if wanted[0] <= 0:
+        return described
     # Near the bounds a body is a point, a rod or a plate, which no tolerance makes of another.
-    lowest = _lowest(described)
-    allowed = _LEAST * lowest if lowest > 0 else lowest - _ROUNDING
-
-    def fits(share: float) -> bool:
-        return _lowest(described + share * (wanted - described)) >= allowed
-
-    low, high = 0.0, 1.0
-    if fits(high):
+    lowest = float(np.linalg.eigvalsh(_about_centre(described))[0])
+    least = _LEAST * lowest if lowest > 0 else lowest
+    moments, axes = np.linalg.eigh(_about_centre(wanted))
+    if moments[0] >= least:
         return wanted
-    # Bodies' numbers form a convex set.
-    for _ in range(30):
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if fits(middle) else (low, middle)
-    return np.asarray(described + low * (wanted - described))
+    more = axes * np.maximum(least - moments, 0.0) @ axes.T
+    grown = np.trace(more) * np.eye(3) - more
+    return np.concatenate([wanted[:4], wanted[4:] + grown[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
+
+
+def _about_centre(numbers: Real) -> Real:
+    """``[3, 3]``: second moments of mass about the centre."""
+    inertia = _inertia(numbers)
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    return np.asarray(second - np.outer(numbers[1:4], numbers[1:4]) / numbers[0])
 
 
 def about_centre(numbers: Real) -> tuple[float, Real, Real]:
@@ -266,14 +270,3 @@ def about_centre(numbers: Real) -> tuple[float, Real, Real]:
 def _inertia(numbers: Real) -> Real:
     xx, yy, zz, xy, xz, yz = numbers[4:]
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _lowest(numbers: Real) -> float:
-    """Lowest eigenvalue of the pseudo-inertia, in lengths such that it's of order one."""
-    inertia, mass = _inertia(numbers), numbers[0]
-    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    length = np.sqrt(max(float(np.trace(second)), 1e-30) / max(float(mass), 1e-30))
-    whole = np.empty((4, 4))
-    whole[:3, :3], whole[:3, 3], whole[3, :3] = second / length**2, numbers[1:4] / length, numbers[1:4] / length
-    whole[3, 3] = mass
-    return float(np.linalg.eigvalsh(whole)[0] / max(abs(mass), 1e-30))
