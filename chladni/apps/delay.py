@@ -61,6 +61,12 @@ def _of_its_unit(log: Log, reference: str, span: Span) -> TimeSeries:
             require_fitting(log, alike, span, work="a delay")
             (series,) = log.read_groups(alike, start_s=span.start_s, end_s=span.end_s)
             # A channel that never changes has no delay.
-            return series.select(list(dict.fromkeys((reference, *moving_channels(series)))))
+            others = [name for name in moving_channels(series) if name != reference]
+            if not others:
+                raise EstimateError(
+                    f"{log.path.name}: nothing that changes is in {units[reference] or 'no unit'} as {reference} is, "
+                    "on its clock; name channels in other units with --response (in Python, responses)"
+                )
+            return series.select([reference, *others])
     require_fitting(log, [reference], span, work="a delay")
     return log.read([reference], start_s=span.start_s, end_s=span.end_s)
