@@ -9,6 +9,7 @@ import pytest
 
 import chladni
 from chladni.signals.value import Value
+from chladni.viewers.figures.correlation import delay_figures
 from tests.made_diagnosis import diagnosis
 
 RATE_HZ = 200.0
@@ -153,3 +154,16 @@ def test_what_has_no_picture_says_so_and_shows_text_in_a_notebook():
     with pytest.raises(chladni.SetupError, match="nothing to draw"):
         empty.plot()
     assert empty._repr_png_() is None
+
+
+def test_a_delay_of_a_few_samples_is_drawn_with_every_sample_around_it():
+    """In a record of minutes, whose correlation reaches over thousands of lags."""
+    noise = np.random.default_rng(0).standard_normal(60_000)
+    found = chladni.time_delay({"a": noise[5:], "b": noise[:-5]}, references="a", sample_rate_hz=1000.0)
+    (figure,) = delay_figures(found).values()
+    lag_s, values = figure.axes[0].lines[1].get_data()
+    lowest_s, highest_s = figure.axes[0].get_xlim()
+    inside = (found.correlation.lag_s >= lowest_s) & (found.correlation.lag_s <= highest_s)
+    np.testing.assert_array_equal(lag_s, found.correlation.lag_s[inside])
+    np.testing.assert_array_equal(values, found.correlation.values[0, inside])
+    plt.close(figure)

@@ -1,5 +1,7 @@
 """Correlation over lag, with the delay that was found."""
 
+from dataclasses import replace
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -34,12 +36,15 @@ def _figures(found: CrossCorrelation, delay_s: np.ndarray) -> dict[str, Figure]:
     figures = {}
     with look():
         for page, rows in pages(len(found.responses), A_SHEET):
+            lowest_s, highest_s = _shown_lags(found, delay_s[list(rows)])
+            # Thinned over seconds, a peak of milliseconds would be a corner or two.
+            shown = _between(found, lowest_s, highest_s)
             figure, stack = sheet([HEIGHT_IN] * len(rows), sharex=True, sharey=True)
             for axes, row in zip(stack, rows, strict=True):
-                draw_correlation(axes, found, row, float(delay_s[row]))
+                draw_correlation(axes, shown, row, float(delay_s[row]))
                 axes.set_title(plain(labels[found.responses[row].name]), loc="left", pad=2)
             stack[-1].set_xlabel(plain(f"Lag after {labels[found.reference.name]} [s]"))
-            stack[-1].set_xlim(*_shown_lags(found, delay_s[list(rows)]))
+            stack[-1].set_xlim(lowest_s, highest_s)
             figure.supylabel("Correlation coefficient", fontsize=8.5)
             figures[f"correlation{page}"] = figure
     return figures
@@ -51,6 +56,11 @@ def _shown_lags(found: CrossCorrelation, delay_s: np.ndarray) -> tuple[float, fl
     step_s = float(found.lag_s[1] - found.lag_s[0])
     reach_s = max(AROUND_A_DELAY * float(known.max()), FEWEST_STEPS * step_s) if known.size else np.inf
     return max(float(found.lag_s[0]), -reach_s), min(float(found.lag_s[-1]), reach_s)
+
+
+def _between(found: CrossCorrelation, lowest_s: float, highest_s: float) -> CrossCorrelation:
+    inside = (found.lag_s >= lowest_s) & (found.lag_s <= highest_s)
+    return replace(found, lag_s=found.lag_s[inside], values=found.values[:, inside])
 
 
 def draw_correlation(axes: Axes, found: CrossCorrelation, row: int, delay_s: float) -> None:
