@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from chladni.gap.records.diagnosis import PARAMETER, Cause, FittedNumber
-from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.effects.catalogue import CATALOGUE, spoken_effect
 from chladni.viewers.engineering import engineering
 
 # A sigma so many times the value tells nothing of it. What can't be negative is fitted by its logarithm: a sigma of
@@ -13,16 +13,14 @@ NOT_DETERMINED = "not determined"
 
 
 def effect_name(effect: str) -> str:
-    """Give an effect's word as one says it; words of somebody's own effects lose their underscores.
+    """Give an effect's word as one says it; a wrong value is one, too.
 
     Examples
     --------
-    >>> effect_name("coulomb_friction"), effect_name("extra_mode"), effect_name("magnetic_brake")
-    ('Coulomb friction', 'an extra mode', 'magnetic brake')
+    >>> effect_name("coulomb_friction"), effect_name("parameter")
+    ('Coulomb friction', 'a wrong value')
     """
-    if effect == PARAMETER:
-        return "a wrong value"
-    return CATALOGUE[effect].spoken if effect in CATALOGUE else effect.replace("_", " ")
+    return "a wrong value" if effect == PARAMETER else spoken_effect(effect)
 
 
 def effect_heading(effect: str) -> str:

@@ -11,6 +11,7 @@ from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
+from chladni.models.effects.catalogue import spoken_effect
 from chladni.signals.errors import EstimateError, ModelError
 
 
@@ -131,7 +132,7 @@ def _spoken(candidate: Contestant) -> tuple[str, str]:
     if not named:
         return "the model as it is", ""
     if len(named) == 1 and named[0].effect != PARAMETER:
-        return named[0].effect.replace("_", " "), named[0].site
+        return spoken_effect(named[0].effect), named[0].site
     words = [_whole(one) for one in named]
     return " with ".join(words), ""
 
@@ -139,7 +140,7 @@ def _spoken(candidate: Contestant) -> tuple[str, str]:
 def _whole(one: Candidate) -> str:
     if one.effect == PARAMETER:
         return f"another value of {one.site}"
-    return f"{one.effect.replace('_', ' ')} at {one.site}"
+    return f"{spoken_effect(one.effect)} at {one.site}"
 
 
 def _listed(words: Sequence[str]) -> str:

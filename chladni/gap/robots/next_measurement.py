@@ -17,6 +17,7 @@ from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import FormKey, Torques
 from chladni.gap.robots.words import ROBOT_WORDS, all_terms
+from chladni.models.effects.catalogue import spoken_effect
 from chladni.robots.excite import random_motion
 from chladni.robots.joint_log import JointLog
 from chladni.robots.motion_limits import FREE_TURN, USUAL_SPEED, Shares
@@ -377,17 +378,13 @@ def _apart_words(doubt: Doubt) -> str:
     if other is None:
         return f"whether there is {_spoken(one)}"
     if one.site == other.site and PARAMETER not in (one.effect, other.effect):
-        return f"{_word(one)} from {_word(other)} at {visible(one.site)}"
+        return f"{spoken_effect(one.effect)} from {spoken_effect(other.effect)} at {visible(one.site)}"
     return f"{_spoken(one)} from {_spoken(other)}"
 
 
 def _spoken(one: Candidate) -> str:
     site = visible(one.site)
-    return f"another value of {site}" if one.effect == PARAMETER else f"{_word(one)} at {site}"
-
-
-def _word(one: Candidate) -> str:
-    return one.effect.replace("_", " ")
+    return f"another value of {site}" if one.effect == PARAMETER else f"{spoken_effect(one.effect)} at {site}"
 
 
 def _look_first(robot: Robot, unexplained: Sequence[RobotJoint]) -> str | None:

@@ -90,6 +90,17 @@ FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 
 
+def spoken_effect(effect: str) -> str:
+    """Give an effect's word as one says it; words of somebody's own effects lose their underscores.
+
+    Examples
+    --------
+    >>> spoken_effect("coulomb_friction"), spoken_effect("extra_mode"), spoken_effect("magnetic_brake")
+    ('Coulomb friction', 'an extra mode', 'magnetic brake')
+    """
+    return CATALOGUE[effect].spoken if effect in CATALOGUE else effect.replace("_", " ")
+
+
 def taking_part(leave_out: Collection[str], own: Iterable[EffectKind]) -> tuple[EffectKind, ...]:
     """Give all words and effects of one's own, which stand in place of a word of their name, but for some."""
     every = {**CATALOGUE, **{kind.name: kind for kind in own}}

@@ -70,7 +70,7 @@ def test_the_motion_that_is_advised_tells_what_was_open(
     assert probabilities.get(("coulomb_friction", "shoulder"), 0.0) < 0.9
     said = before.next_measurement or ""
     assert said.startswith("To tell ")
-    assert {"coulomb friction", "viscous friction"} == set(re.findall(r"\w+ friction", said))
+    assert {"Coulomb friction", "viscous friction"} == set(re.findall(r"\w+ friction", said))
     # Moved alone, friction of the shoulder would look like that of its speed and the elbow's together.
     assert "at shoulder, move all joints: " in said
     assert said.endswith("my arm.xml' --out motion.csv")
