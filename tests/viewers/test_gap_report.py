@@ -45,6 +45,12 @@ def test_the_report_holds_every_table_and_the_law(arm: str) -> None:
     assert any("F = force tanh(s/creep_speed) + offset (regularised)" in text for text in shown)
 
 
+def test_a_law_that_several_joints_share_is_told_once() -> None:
+    both = replace(made.diagnosis(), causes=(made.friction(), replace(made.friction(), site="shoulder")))
+    shown = Page(gap_report_html(gap_evidence(both), album=NO_FIGURES)).texts
+    assert sum("F = force tanh(s/creep_speed)" in text for text in shown) == 1
+
+
 def test_the_report_has_every_figure_with_its_caption(arm: str) -> None:
     page = Page(arm)
     assert page.tags.count("img") == 6

@@ -162,9 +162,9 @@ def _answer(found: Diagnosis) -> str:
 
 
 def _causes(found: Diagnosis) -> str:
-    # Effects of somebody's own have no law here.
-    laws = [law for law in map(cause_law, found.causes) if law]
-    return _tables((tables.cause_table(found), (3,))) + _list(laws)
+    # Effects of somebody's own have no law here; joints that rub alike share one.
+    laws = dict.fromkeys(law for law in map(cause_law, found.causes) if law)
+    return _tables((tables.cause_table(found), (3,))) + _list(tuple(laws))
 
 
 def _naive(found: Diagnosis) -> str:
