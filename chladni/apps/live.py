@@ -93,10 +93,10 @@ def live(
     stop
         Ends it when set, with a last state.
 
-    Yields
-    ------
-    LiveState
-        Whenever samples came, something happened, or averages were renewed; the last has `ended` set.
+    Returns
+    -------
+    Iterator[LiveState]
+        A state whenever samples came, something happened, or averages were renewed; the last has `ended` set.
 
     Raises
     ------
@@ -133,9 +133,13 @@ def live(
         )
     else:
         samples = source
+    return _states(samples, options, stop or threading.Event())
+
+
+def _states(samples: LiveSamples, options: LiveOptions, stop: threading.Event) -> Iterator[LiveState]:
     session = _Session(samples, options)
     try:
-        yield from session.run(stop or threading.Event())
+        yield from session.run(stop)
     finally:
         session.close()
 
@@ -330,6 +334,7 @@ class _Session:
                 severity = averages.severity()
                 found["severities"] += [] if severity is None else [severity]
         self._values |= {name: tuple(some) for name, some in found.items()}
+        self._values["still"] = tuple(name for grid in self._grids.values() for name in grid.still)
 
     def _renew_response(self, ended: bool) -> None:
         for_modes = self._options.modes_every_s > 0 and (ended or self._looks.due)

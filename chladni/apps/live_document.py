@@ -1,14 +1,16 @@
 """A live source as the study that viewers and reports draw, and as the document of its command."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from chladni.apps.documents import Document, finite, frf_document, psd_document
 from chladni.apps.levels import LogLevels, levels_document
 from chladni.apps.modes_document import modes_document
+from chladni.apps.sources import without
 from chladni.apps.unit_peaks import unit_peaks
+from chladni.io.log_info import some_of
 from chladni.modal.shapes.validation import validate
 from chladni.signals.live_state import LiveEvent, LiveState
 from chladni.signals.study import Study
@@ -28,6 +30,9 @@ def live_study(state: LiveState, findings: Sequence[str] = ()) -> Study:
     findings
         Sentences to put first.
     """
+    still = still_channels(state)
+    state = _without(state, still)
+    notes = (f"channels that never change are left out: {some_of(sorted(still))}",) if still else ()
     peaks = [peak for density in state.densities for group in unit_peaks(density) for peak in group.peaks]
     modes = state.modes if state.modes is not None and state.modes.frequency_hz.size else None
     return Study(
@@ -43,7 +48,28 @@ def live_study(state: LiveState, findings: Sequence[str] = ()) -> Study:
         levels=state.levels,
         severities=state.severities,
         geometry=state.geometry,
-        findings=tuple(findings),
+        findings=(*findings, *notes),
+    )
+
+
+def still_channels(state: LiveState) -> frozenset[str]:
+    """Names of the channels that never changed, which pictures leave out; none where all are so."""
+    channels = sum(len(one.channels) for one in state.levels)
+    return frozenset(state.still) if len(state.still) < channels else frozenset()
+
+
+def _without(state: LiveState, still: Collection[str]) -> LiveState:
+    """Leave channels out of what is drawn: dozens of empty pictures hide the others."""
+    response = state.response
+    answers = [one.name for one in response.responses if one.name not in still] if response is not None else []
+    return replace(
+        state,
+        series=without(still, state.series),
+        densities=without(still, state.densities),
+        levels=without(still, state.levels),
+        severities=without(still, state.severities),
+        waterfalls=without(still, state.waterfalls),
+        response=response.select(answers) if response is not None and answers else None,
     )
 
 

@@ -126,6 +126,11 @@ class LiveGrid:
                 self._moved.add(channel.name)
 
     @property
+    def still(self) -> tuple[str, ...]:
+        """Names of the channels that showed one value only, or none."""
+        return tuple(channel.name for channel in self.channels if channel.name not in self._moved)
+
+    @property
     def references(self) -> tuple[str, ...]:
         """Those that were named, else the excitations that moved."""
         if self._options.references is not None:

@@ -143,12 +143,13 @@ _SpectrumT = TypeVar("_SpectrumT", bound=_Spectrum)
 
 def moving_only(found: Iterable[tuple[_SpectrumT, Watched]]) -> tuple[_SpectrumT, ...]:
     """Give what was found of channels that change; what holds none of them is left out."""
-    kept = []
-    for one, grid in found:
-        still = set(grid.constant())
-        if names := [channel.name for channel in one.channels if channel.name not in still]:
-            kept.append(one.select(names))
-    return tuple(kept)
+    return tuple(kept for one, grid in found for kept in without(grid.constant(), [one]))
+
+
+def without(still: Collection[str], found: Iterable[_SpectrumT]) -> tuple[_SpectrumT, ...]:
+    """Leave these channels out; what holds none but them goes, too."""
+    some = ((one, [channel.name for channel in one.channels if channel.name not in still]) for one in found)
+    return tuple(one.select(names) for one, names in some if names)
 
 
 _Moments = tuple[float, float, float]

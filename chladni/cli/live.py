@@ -17,7 +17,7 @@ from chladni.cli.levels import MachineName
 from chladni.cli.opening import opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
-from chladni.cli.words import number, with_error
+from chladni.cli.words import number, unit, with_error
 
 if TYPE_CHECKING:
     from chladni.apps.live_document import EventBook
@@ -245,25 +245,30 @@ def _say(out: Output, book: "EventBook", events: Any) -> None:
 
 def _told(out: Output, state: "LiveState", book: "EventBook") -> tuple[str, ...]:
     """Print what the averages have come to."""
+    from chladni.apps.live_document import still_channels
+
+    still = still_channels(state)
     for density, levels in zip(state.densities, state.levels, strict=False):
         out.table(
             f"Levels after {state.time_s:.1f} s, {density.provenance.averages} averages",
-            ["channel", "RMS", "peak", "crest factor", "kurtosis"],
+            ["channel", "RMS", "unit", "peak", "crest factor", "kurtosis"],
             [
                 [
                     channel.name,
                     with_error(float(levels.rms[row, 0]), float(levels.rms_std[row, 0])),
+                    unit(channel.unit),
                     number(float(levels.peak[row, 0])),
                     number(float(levels.crest_factor[row, 0])),
                     number(float(levels.kurtosis[row, 0])),
                 ]
                 for row, channel in enumerate(levels.channels)
+                if channel.name not in still
             ],
         )
     if state.tracked:
         out.table(
             "Modes of the present, from responses alone",
-            ["mode", "Hz", "damping %", "MAC", "seen"],
+            ["mode", "frequency [Hz]", "damping ratio [%]", "MAC", "seen"],
             [
                 [
                     str(mode.number),

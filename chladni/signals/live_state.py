@@ -96,6 +96,8 @@ class LiveState:
         H1 and coherence to the references; None without references.
     waterfalls, levels, severities
         One entry a sampling grid.
+    still
+        Names of the channels whose samples have all had one value.
     modes
         From responses alone, of the average over all; None before the first look.
     tracked
@@ -120,6 +122,7 @@ class LiveState:
     waterfalls: tuple[Waterfall, ...] = ()
     levels: tuple[Levels, ...] = ()
     severities: tuple[Severity, ...] = ()
+    still: tuple[str, ...] = ()
     modes: ModeSet | None = None
     tracked: tuple[TrackedMode, ...] = ()
     recent: ModeSet | None = None

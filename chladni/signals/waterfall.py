@@ -1,13 +1,13 @@
 """Spectra over time."""
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.arrays import Real
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, Names, find_channels
 from chladni.signals.errors import EstimateError
 from chladni.signals.provenance import Provenance
 from chladni.signals.units import power_density_unit
@@ -55,3 +55,8 @@ class Waterfall(Value):
         expected = (len(self.channels), self.time_s.size, self.frequency_hz.size)
         require_shape("values", self.values, expected, "channels x times x frequencies")
         self._freeze()
+
+    def select(self, names: Names) -> Self:
+        """Give the spectra of the named channels; `EstimateError` naming those there are when one is missing."""
+        rows = find_channels(self.channels, names)
+        return replace(self, values=self.values[rows], channels=tuple(self.channels[row] for row in rows))

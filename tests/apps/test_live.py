@@ -1,6 +1,7 @@
 """Averages that ran while a log grew are those of the finished file; what changes in it is told."""
 
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -147,3 +148,24 @@ def test_a_reference_that_no_channel_is_is_told(log: Path) -> None:
         f"no frequency response to /shaker.wrench.torque.z yet: no channel is named so; did you mean {FORCE}?"
     ]
     assert states[-1].response is None
+
+
+def test_channels_that_never_change_are_left_out_of_pictures_and_named(tmp_path: Path) -> None:
+    force, answer = np.random.default_rng(0).standard_normal((2, 3000))
+    # Equal values have a mean that may differ from them by rounding.
+    rows = {FORCE: force, "/imu.x": answer, "/imu.y": np.zeros(3000), "/imu.z": np.full(3000, 0.1)}
+    channels = [Channel(name=name, unit="N" if name == FORCE else "m/s^2") for name in rows]
+    series = TimeSeries(values=np.stack(list(rows.values())), sample_rate_hz=100.0, channels=tuple(channels))
+    write_mcap([series], tmp_path / "imu.mcap")
+    *_, state = live(Bits((tmp_path / "imu.mcap").read_bytes()), references=FORCE, modes_every_s=0)
+    assert state.still == ("/imu.y", "/imu.z")
+    assert len(live_document(state, EventBook())["levels"]["channels"]) == 4
+    study = live_study(state, ["first"])
+    assert study.findings == ("first", "channels that never change are left out: /imu.y, /imu.z")
+    for parts in (study.densities, study.levels, study.waterfalls):
+        assert [channel.name for part in parts for channel in part.channels] == [FORCE, "/imu.x"]
+    assert [channel.name for part in study.severities for channel in part.channels] == ["/imu.x"]
+    assert study.response is not None
+    assert [channel.name for channel in study.response.responses] == ["/imu.x"]
+    at_rest = replace(state, still=tuple(rows))
+    assert [len(one.channels) for one in live_study(at_rest).densities] == [4]

@@ -12,6 +12,9 @@ import numpy as np
 import pytest
 
 from chladni.apps.spectra import psd
+from chladni.io.mcap.writer import write_mcap
+from chladni.signals.channel import Channel
+from chladni.signals.time_series import TimeSeries
 from tests.arm import write_arm
 from tests.cli.conftest import Run
 
@@ -39,6 +42,26 @@ def test_a_finished_log_ends_by_its_footer_with_everything_written(run: Run, arm
     assert "<html" in (tmp_path / "a.html").read_text()
 
 
+def _line(text: str, part: str) -> str:
+    return next(line for line in text.splitlines() if part in line)
+
+
+def test_levels_are_printed_with_their_units(run: Run, tmp_path: Path) -> None:
+    rows = np.random.default_rng(0).standard_normal((2, 2000))
+    rows[1] = 3.0
+    channels = (Channel(name="/motor.torque", unit="N m"), Channel(name="/motor.position", unit="rad"))
+    write_mcap([TimeSeries(values=rows, sample_rate_hz=100.0, channels=channels)], tmp_path / "motor.mcap")
+    found = run("live", tmp_path / "motor.mcap", "--no-view", "--modes-every", "0", "--report", tmp_path / "a.html")
+    table = found.out.split("Levels after")[1]
+    heading, torque = (_line(table, one) for one in ("crest factor", "/motor.torque"))
+    assert heading.split()[:4] == ["channel", "RMS", "unit", "peak"]
+    assert float(torque.split()[1]) == pytest.approx(rows[0].std(), rel=0.02)
+    assert " N m " in torque
+    # A table of zeros hides the rest; the report says what is left out.
+    assert "/motor.position" not in table
+    assert "channels that never change are left out: /motor.position" in (tmp_path / "a.html").read_text()
+
+
 def test_options_that_cant_be_are_one_line(run: Run, arm: Path, tmp_path: Path) -> None:
     for words, told in (
         (("--stamp", "never"), "'never' is not one of 'auto', 'header', 'publish', 'log'"),
@@ -51,6 +74,19 @@ def test_options_that_cant_be_are_one_line(run: Run, arm: Path, tmp_path: Path) 
         assert found.code == 2
         assert told in found.err
         assert found.err.count("\n") == 1
+
+
+def test_a_source_that_isnt_there_costs_no_recording(run: Run, tmp_path: Path) -> None:
+    kept = tmp_path / "yesterday.rrd"
+    kept.write_bytes(b"yesterday's")
+    for words in (("--save", kept), ()):
+        # Without --save the viewer would be opened, which fails where there is no display.
+        found = run("live", tmp_path / "nowhere.mcap", *words)
+        assert found.code == 2
+        assert "nowhere.mcap: there is no such file; start its recorder first" in found.err
+        assert found.err.count("\n") == 1
+        assert "recording" not in found.out
+    assert kept.read_bytes() == b"yesterday's"
 
 
 def test_ctrl_c_leaves_recording_and_document(arm: Path, tmp_path: Path) -> None:
