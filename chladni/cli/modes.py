@@ -64,7 +64,6 @@ def modes(
     """Natural frequencies, damping ratios and modal vectors, with their uncertainty."""
     from chladni.apps.modal_study import modal_study
     from chladni.apps.modes import Wanted
-    from chladni.apps.modes_document import modes_document
 
     out = targets.output([log, opener.setup], others={"--uff": uff, "--save": save})
     wanted = Wanted.of(bands_hz=None if band is None else [band], count=count, frequencies_hz=frequency)
@@ -81,10 +80,7 @@ def modes(
     print_modes(out, found.modes, found.validation)
     print_relative_motion(out, found.modes, found.study.relative_motion)
     out.lines(found.study.findings)
-    _write(out, found, uff=uff, save=save)
-    out.pictures(found.study, figures=targets.figures, report=targets.report)
-    motions, passed_on = found.study.relative_motion, found.transmissibility
-    out.json(modes_document(found.modes, found.validation, motions, passed_on))
+    _write(out, found, targets, uff=uff, save=save)
 
 
 def _picking(out: Output, log: "OpenedLog", **given: Any) -> "ModePicking":
@@ -116,7 +112,11 @@ def _kept(out: Output, picking: "ModePicking", wanted: "Wanted", *, port: int, o
     return replace(wanted, count=None, frequencies_hz=picking.frequencies_hz)
 
 
-def _write(out: Output, found: "ModalStudy", *, uff: Path | None, save: Path | None) -> None:
+def _write(
+    out: Output, found: "ModalStudy", targets: options.Targets, *, uff: Path | None, save: Path | None
+) -> None:
+    from chladni.apps.modes_document import modes_document
+
     if uff is not None:
         from chladni.io.files.uff_modes import write_uff_modes
 
@@ -127,3 +127,6 @@ def _write(out: Output, found: "ModalStudy", *, uff: Path | None, save: Path | N
         from chladni.viewers.rerun import write_rrd
 
         out.line(f"recording: {write_rrd(found.study, save)}")
+    out.pictures(found.study, figures=targets.figures, report=targets.report)
+    motions, passed_on = found.study.relative_motion, found.transmissibility
+    out.json(modes_document(found.modes, found.validation, motions, passed_on))
