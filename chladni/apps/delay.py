@@ -1,9 +1,12 @@
 """Time delays between the channels of a log."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
-from chladni.apps.sources import Span, joined, moving_channels, require_fitting
+import numpy as np
+
+from chladni.apps.sources import Span, joined, moving_channels, whole_channels
 from chladni.io.log import Log
 from chladni.signals.cross_correlation import TimeDelays
 from chladni.signals.errors import EstimateError
@@ -33,40 +36,68 @@ def log_delays(
         As `time_delay` does.
     """
     first = log.name(reference)
-    notes: tuple[str, ...] = ()
-    if responses is None:
-        series = _of_its_unit(log, first, span)
-    else:
-        names = list(dict.fromkeys([first, *log.names(responses)]))
-        require_fitting(log, names, span, work="a delay")
-        series, notes = joined(log, names, span)
+    how: dict[str, Any] = {
+        "references": first, "band_hz": band_hz, "longest_delay_s": longest_delay_s, "resolution_hz": resolution_hz,
+    }  # fmt: skip
+
+    def delays(series: TimeSeries) -> TimeDelays | None:
+        # What wasn't asked for by name is left out where it never changes.
+        moving = moving_channels(series) if responses is None else [channel.name for channel in series.channels]
+        others = [name for name in moving if name != first]
+        return time_delay(series.select([first, *others]), **how) if others else None
+
+    notes, parts = _of_its_unit(log, first, span) if responses is None else _named(log, first, responses, span)
     try:
-        found = time_delay(
-            series,
-            references=first,
-            band_hz=band_hz,
-            longest_delay_s=longest_delay_s,
-            resolution_hz=resolution_hz,
-        )
+        # No name holds a part while the next one is read.
+        found = [one for one in map(delays, parts) if one is not None]
     except EstimateError as error:
         raise EstimateError(f"{log.path.name}: {error}") from error
-    return replace(found, notes=(*notes, *found.notes))
+    if not found:
+        unit = next(channel.unit for channel in log.channels if channel.name == first)
+        raise EstimateError(
+            f"{log.path.name}: nothing that changes is in {unit or 'no unit'} as {first} is, on its clock; name "
+            "channels in other units with --response (in Python, responses)"
+        )
+    together = _together(found)
+    return replace(together, notes=(*notes, *together.notes))
 
 
-def _of_its_unit(log: Log, reference: str, span: Span) -> TimeSeries:
+_Parts = tuple[tuple[str, ...], Iterable[TimeSeries]]
+
+
+def _named(log: Log, reference: str, responses: Sequence[str], span: Span) -> _Parts:
+    names = list(dict.fromkeys([reference, *log.names(responses)]))
+    if len(names) == 1:
+        raise EstimateError(f"{log.path.name}: {reference} is the only channel; name another one as a response")
+    grids = whole_channels(log, names, span, work="a delay", beside=[reference])
+    if len(grids) == 1:
+        return (), grids[0]
+    series, notes = joined(log, names, span)
+    return notes, [series]
+
+
+def _of_its_unit(log: Log, reference: str, span: Span) -> _Parts:
     units = {channel.name: channel.unit for channel in log.channels}
-    for grid in log.grids(None, start_s=span.start_s, end_s=span.end_s):
-        if reference in grid.names:
-            alike = [name for name in grid.names if units[name] == units[reference]]
-            require_fitting(log, alike, span, work="a delay")
-            (series,) = log.read_groups(alike, start_s=span.start_s, end_s=span.end_s)
-            # A channel that never changes has no delay.
-            others = [name for name in moving_channels(series) if name != reference]
-            if not others:
-                raise EstimateError(
-                    f"{log.path.name}: nothing that changes is in {units[reference] or 'no unit'} as {reference} is, "
-                    "on its clock; name channels in other units with --response (in Python, responses)"
-                )
-            return series.select([reference, *others])
-    require_fitting(log, [reference], span, work="a delay")
-    return log.read([reference], start_s=span.start_s, end_s=span.end_s)
+    grids = log.grids(None, start_s=span.start_s, end_s=span.end_s)
+    names = next((grid.names for grid in grids if reference in grid.names), (reference,))
+    alike = [name for name in names if units[name] == units[reference]]
+    (grid,) = whole_channels(log, alike, span, work="a delay", beside=[reference])
+    return (), grid
+
+
+def _together(parts: Sequence[TimeDelays]) -> TimeDelays:
+    """Join what was found of some responses each."""
+    first, correlation = parts[0], parts[0].correlation
+    responses = tuple(channel for one in parts for channel in one.responses)
+    return replace(
+        first,
+        delay_s=np.concatenate([one.delay_s for one in parts]),
+        std_s=np.concatenate([one.std_s for one in parts]),
+        coherence=np.concatenate([one.coherence for one in parts]),
+        inverted=tuple(inverted for one in parts for inverted in one.inverted),
+        responses=responses,
+        correlation=replace(
+            correlation, values=np.concatenate([one.correlation.values for one in parts]), responses=responses
+        ),
+        notes=tuple(note for one in parts for note in one.notes),
+    )

@@ -1,12 +1,12 @@
 """Order tracking of a log: the shaft's rotation, maps of all orders, cuts of some."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
-from chladni.apps.sources import Span, moving_channels, require_fitting
+from chladni.apps.sources import Span, WholeChannels, moving_channels, whole_channels
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import EstimateError
@@ -47,7 +47,7 @@ def track_orders(
     Parameters
     ----------
     log
-        Read into memory.
+        Of a large one, some channels are in memory at a time.
     shaft
         Message path of the channel that tells the rotation.
     channels
@@ -69,20 +69,27 @@ def track_orders(
         When no channel is left to track, or an argument is out of its range.
     """
     name = log.name(shaft)
-    require_fitting(log, None if channels is None else [name, *log.names(channels)], span, work="order tracking")
-    (told,) = log.read_groups([name], start_s=span.start_s, end_s=span.end_s)
+    grids = whole_channels(log, [name], span, work="order tracking")
+    ((told,),) = grids
     try:
         turned = rotation(told, **({telling: name} | how))
         # A ridge is a vibration itself.
-        series = _moving(_tracked(log, channels, () if turned.source == "ridge" else (name,), span))
+        names = _tracked(log, channels, () if turned.source == "ridge" else (name,), span)
+        parts = whole_channels(log, names, span, work="order tracking")
         window: dict[str, Any] = {} if revolutions is None else {"revolutions": revolutions}
-        maps = tuple(order_map(one, turned, highest_order=highest_order, **window) for one in series)
+        maps = _of_moving(parts, lambda series: order_map(series, turned, highest_order=highest_order, **window))
+        _require_moving(names, maps)
         wanted = strongest_orders(maps, count=ORDERS_TOLD) if orders is None else orders
-        cuts = tuple(order_cuts(one, turned, orders=wanted, method=method, **window) for one in series)
+        cuts = _of_moving(parts, lambda series: order_cuts(series, turned, orders=wanted, method=method, **window))
         _require_shown(cuts)
     except EstimateError as error:
         raise EstimateError(f"{log.path.name}: {error}") from error
     return OrderStudy(rotation=turned, maps=maps, cuts=cuts)
+
+
+def _require_moving(names: Sequence[str], maps: Sequence[OrderMap]) -> None:
+    if not maps:
+        raise EstimateError(f"{some_of(names)} never changes, so it has no orders; name another channel (--channel)")
 
 
 def _require_shown(cuts: Sequence[OrderCuts]) -> None:
@@ -96,25 +103,46 @@ def _require_shown(cuts: Sequence[OrderCuts]) -> None:
             )
 
 
-def _moving(groups: Sequence[TimeSeries]) -> tuple[TimeSeries, ...]:
-    """Leave out what never changes: all that its orders would show is rounding."""
-    kept = [moving_channels(one) for one in groups]
-    if not any(kept):
-        still = [channel.name for one in groups for channel in one.channels]
-        raise EstimateError(f"{some_of(still)} never changes, so it has no orders; name another channel (--channel)")
-    return tuple(one.select(names) for one, names in zip(groups, kept, strict=True) if names)
+_Orders = TypeVar("_Orders", OrderMap, OrderCuts)
 
 
-def _tracked(log: Log, channels: Sequence[str] | None, shaft: Sequence[str], span: Span) -> tuple[TimeSeries, ...]:
-    groups = log.read_groups(channels, start_s=span.start_s, end_s=span.end_s)
+def _of_moving(grids: Sequence[WholeChannels], estimate: Callable[[TimeSeries], _Orders]) -> tuple[_Orders, ...]:
+    """Estimate of each grid, without what never changes: all that its orders would show is rounding."""
+
+    def of_part(series: TimeSeries) -> _Orders | None:
+        moving = moving_channels(series)
+        return estimate(series.select(moving)) if moving else None
+
+    found: list[_Orders] = []
+    for grid in grids:
+        parts = filter(None, map(of_part, grid))
+        # All parts after the first are joined to it.
+        found += [_together(first, parts, most=len(grid.names)) for first in parts]
+    return tuple(found)
+
+
+def _together(first: _Orders, others: Iterator[_Orders], *, most: int) -> _Orders:
+    """Join what was found of some channels of a grid each, of at most so many."""
+    # In place: many channels' maps take much memory, and as much again to join them afterwards.
+    values = np.empty((most, *first.values.shape[1:]), first.values.dtype)
+    values[: len(first.channels)] = first.values
+    channels = list(first.channels)
+    joined = replace(first, values=values[:0], channels=())
+    for one in others:
+        values[len(channels) : len(channels) + len(one.channels)] = one.values
+        channels += one.channels
+    return replace(joined, values=values[: len(channels)], channels=tuple(channels))
+
+
+def _tracked(log: Log, channels: Sequence[str] | None, shaft: Sequence[str], span: Span) -> tuple[str, ...]:
+    """Names of the channels that were asked for; else of all accelerations, or of all but the shaft's."""
     if channels is not None:
-        return groups
-    others = [[c for c in one.channels if c.name not in shaft] for one in groups]
+        return log.names(channels)
+    units = {channel.name: channel.unit for channel in log.channels}
+    grids = log.grids(None, start_s=span.start_s, end_s=span.end_s)
+    others = tuple(name for grid in grids for name in grid.names if name not in shaft)
     # A log holds much beside vibration, such as commands and temperatures.
-    accelerations = [[c for c in some if c.unit == "m/s^2"] for some in others]
-    chosen = accelerations if any(accelerations) else others
-    if not any(chosen):
+    accelerations = tuple(name for name in others if units[name] == "m/s^2")
+    if not others:
         raise EstimateError(f"no channel but {some_of(list(shaft))} is there; a vibration is needed beside it")
-    return tuple(
-        one.select([channel.name for channel in some]) for one, some in zip(groups, chosen, strict=True) if some
-    )
+    return accelerations or others

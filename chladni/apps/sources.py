@@ -24,6 +24,8 @@ from chladni.signals.wording import counted
 Progress = Callable[[float], None]
 #: Samples that are held as a whole: a gigabyte, and a few times as much of what is made of them.
 MOST_VALUES = 1 << 27
+#: Samples of channels that are read together where each is worked on by itself.
+VALUES_TOGETHER = 1 << 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,26 +178,60 @@ def _together(known: _Moments, more: _Moments) -> _Moments:
     return total, mean + apart * fresh / total, squares + (fresh_squares + apart * apart * samples * fresh / total)
 
 
-def require_fitting(log: Log, channels: Sequence[str] | None, span: Span, *, work: str) -> None:
-    """Refuse to hold channels in memory as a whole that don't fit there with what is made of them.
+class WholeChannels:
+    """Some channels of a sampling grid at a time, each with all its samples; read anew as often as they're asked for.
+
+    Parameters
+    ----------
+    log, names, span
+        Names share a grid.
+    samples
+        That each of them has.
+    beside
+        Names that are read with each of the others, and come first.
+    """
+
+    def __init__(self, log: Log, names: Sequence[str], span: Span, *, samples: int, beside: Sequence[str]) -> None:
+        self.names = tuple(names)
+        self._log, self._span, self._beside = log, span, tuple(beside)
+        room = max(1, VALUES_TOGETHER // max(samples, 1) - len(self._beside))
+        self._parts = [self.names[first : first + room] for first in range(0, len(self.names), room)]
+        self._held: TimeSeries | None = None
+
+    def __iter__(self) -> Iterator[TimeSeries]:
+        if len(self._parts) == 1:
+            self._held = self._read(self.names) if self._held is None else self._held
+            yield self._held
+            return
+        yield from map(self._read, self._parts)
+
+    def _read(self, names: Sequence[str]) -> TimeSeries:
+        return self._log.read([*self._beside, *names], start_s=self._span.start_s, end_s=self._span.end_s)
+
+
+def whole_channels(
+    log: Log, names: Sequence[str] | None, span: Span, *, work: str, beside: Sequence[str] = ()
+) -> tuple[WholeChannels, ...]:
+    """Give channels that are worked on one by one, those of each sampling grid; see `WholeChannels`.
 
     Raises
     ------
     LogError
-        When there are more than `MOST_VALUES` samples.
+        When the samples of one channel, and of those beside it, are more than `MOST_VALUES`.
     """
-    if is_small(log):
-        return
-    grids = log.grids(channels, start_s=span.start_s, end_s=span.end_s)
-    values = sum(len(grid.names) * grid.samples for grid in grids)
-    if values > MOST_VALUES:
-        count = sum(len(grid.names) for grid in grids)
-        share_s = max(grid.duration_s for grid in grids) * MOST_VALUES / values
-        raise LogError(
-            f"{log.path.name}: {work} takes all samples at once, and {values:.3g} of {counted(count, 'channel')} are "
-            f"more than the {MOST_VALUES} that fit in memory; name fewer channels, or a part of {share_s:.3g} s or "
-            "less (--start, --end)"
-        )
+    found = []
+    for grid in log.grids(names, start_s=span.start_s, end_s=span.end_s):
+        values = (1 + len(beside)) * grid.samples
+        if values > MOST_VALUES:
+            share_s = grid.duration_s * MOST_VALUES / values
+            raise LogError(
+                f"{log.path.name}: {work} takes all samples of {counted(1 + len(beside), 'channel')} at once, and "
+                f"{values:.3g} are more than the {MOST_VALUES} that fit in memory; name a part of {share_s:.3g} s or "
+                "less (--start, --end)"
+            )
+        others = [name for name in grid.names if name not in beside]
+        found.append(WholeChannels(log, others, span, samples=grid.samples, beside=beside))
+    return tuple(found)
 
 
 class _Blocks:

@@ -203,6 +203,8 @@ class TimeSeries(Value):
     def select(self, names: Names) -> Self:
         """Give the channels that words name, in the order asked for."""
         rows = find_channels(self.channels, names)
+        if rows == list(range(len(self.channels))):
+            return self
         valid = None if self.valid is None else self.valid[rows]
         return replace(
             self, values=self.values[rows], valid=valid, channels=tuple(self.channels[row] for row in rows)

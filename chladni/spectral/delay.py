@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chladni.io.source import SeriesLike, series_of
-from chladni.signals.arrays import Real
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.channel import Names, as_names
 from chladni.signals.cross_correlation import CrossCorrelation, TimeDelays
 from chladni.signals.errors import EstimateError
@@ -69,8 +69,8 @@ def cross_correlation(
 
     Notes
     -----
-    rho(tau) = sum(x(t) y(t + tau)) / sqrt(sum(x^2) sum(y^2)) (Bendat & Piersol 2010, eq. 5.16 f.), by
-    `scipy.signal.correlate`; the sum isn't stretched for samples that a lag leaves out, so that the ends stay quiet.
+    rho(tau) = sum(x(t) y(t + tau)) / sqrt(sum(x^2) sum(y^2)) (Bendat & Piersol 2010, eq. 5.16 f.), by FFT;
+    the sum isn't stretched for samples that a lag leaves out, so that the ends stay quiet.
 
     Examples
     --------
@@ -81,15 +81,7 @@ def cross_correlation(
     0.3
     """
     chosen = _chosen(source, references, responses, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
-    values = _whole_run(chosen)
-    longest = values.shape[1] // 2 if longest_lag_s is None else round(longest_lag_s * chosen.sample_rate_hz)
-    if not 0 < longest < values.shape[1]:
-        raise EstimateError(
-            f"the longest lag is {longest / chosen.sample_rate_hz:g} s; it must lie within the record, "
-            f"{values.shape[1] / chosen.sample_rate_hz:g} s without a gap"
-        )
-    require_in_range(chosen.channels, np.abs(values).max(axis=1))
-    return _correlated(chosen, values, longest)
+    return _correlated(chosen, None if longest_lag_s is None else round(longest_lag_s * chosen.sample_rate_hz))
 
 
 def time_delay(
@@ -126,7 +118,8 @@ def time_delay(
     Returns
     -------
     TimeDelays
-        With one sigma.
+        With one sigma. Of each response the longest run of samples that was measured in it and in the reference tells
+        the peak.
 
     Raises
     ------
@@ -146,23 +139,22 @@ def time_delay(
     low_hz, high_hz = (0.0, nyquist_hz) if band_hz is None else band_hz
     if not 0 <= low_hz < high_hz <= nyquist_hz:
         raise EstimateError(f"a band from {low_hz:g} to {high_hz:g} Hz isn't one within 0 to {nyquist_hz:g} Hz")
-    filtered = _within(chosen, low_hz, high_hz)
-    longest_s = filtered.duration_s / 10 if longest_delay_s is None else longest_delay_s
-    whole = cross_correlation(filtered, references=references, responses=responses)
-    if round(longest_s * chosen.sample_rate_hz) > 0 and longest_s < whole.lag_s[-1]:
-        correlation = _up_to(whole, longest_s, (low_hz, high_hz))
-    else:
-        correlation = cross_correlation(filtered, references=references, responses=responses, longest_lag_s=longest_s)
-    found = [
-        _fitted(
-            chosen.select([correlation.reference.name, channel.name]),
-            row,
-            correlation,
-            (low_hz, high_hz),
-            resolution_hz,
-        )
-        for row, channel in enumerate(correlation.responses)
-    ]
+    longest_s = chosen.duration_s / 10 if longest_delay_s is None else longest_delay_s
+    reference, *others = (channel.name for channel in chosen.channels)
+    before = _within(chosen.select(reference), low_hz, high_hz)
+    correlations, found = [], []
+    for name in others:
+        # One response at a time: of a long record, a few copies of many channels don't fit in memory.
+        pair = chosen.select([reference, name])
+        late = _within(pair.select(name), low_hz, high_hz)
+        correlations.append(_near_peak(before, late, longest_s, (low_hz, high_hz)))
+        del late
+        found.append(_fitted(pair, correlations[-1], (low_hz, high_hz), resolution_hz))
+    correlation = replace(
+        correlations[0],
+        values=np.concatenate([one.values for one in correlations]),
+        responses=chosen.channels[1:],
+    )
     peaks = np.abs(correlation.values)
     return TimeDelays(
         delay_s=np.array([one.delay_s for one in found]),
@@ -188,48 +180,74 @@ def _chosen(source: SeriesLike, reference: str, responses: Names | None, **part:
     return series.select([first, *others])
 
 
-def _whole_run(series: TimeSeries) -> Real:
-    """``[channel, sample]`` of the longest run that all channels have, without means."""
+def _longest_run(series: TimeSeries) -> TimeSeries:
+    """Give the longest run of samples that all channels have."""
     runs = list(channel_runs(np.logical_and.reduce(measured_samples(series), axis=0)))
     if not runs:
         raise EstimateError("no sample was measured in all channels at once")
-    first, last = max(runs, key=lambda run: run[1] - run[0])
-    values = series.values[:, first:last].astype(np.float64)
-    values -= values.mean(axis=1, keepdims=True)
-    still = [channel.name for channel, row in zip(series.channels, values, strict=True) if not row.any()]
+    run = series.samples_between(*max(runs, key=lambda run: run[1] - run[0]))
+    lowest, highest = run.values.min(axis=1), run.values.max(axis=1)
+    still = [channel.name for channel, moves in zip(run.channels, lowest < highest, strict=True) if not moves]
     if still:
         raise EstimateError(f"{', '.join(still)} never changes; leave it out")
-    return values
+    require_in_range(run.channels, np.maximum(np.abs(lowest), np.abs(highest)).astype(np.float64))
+    return run
 
 
-def _correlated(series: TimeSeries, values: Real, longest: int) -> CrossCorrelation:
-    from scipy.signal import correlate
+def _correlated(series: TimeSeries, longest: int | None) -> CrossCorrelation:
+    """Correlate all channels with the first, up to so many samples of lag; half the record if none is given."""
+    import scipy.fft
 
-    size = np.sqrt(np.sum(np.square(values), axis=1))
-    zero = values.shape[1] - 1
-    rows = [
-        correlate(row, values[0], mode="full", method="fft")[zero - longest : zero + longest + 1] / (size[0] * own)
-        for row, own in zip(values[1:], size[1:], strict=True)
-    ]
+    run = _longest_run(series)
+    longest = run.samples // 2 if longest is None else longest
+    if not 0 < longest < run.samples:
+        raise EstimateError(
+            f"the longest lag is {longest / run.sample_rate_hz:g} s; it must lie within the record, "
+            f"{run.duration_s:g} s without a gap"
+        )
+    # Zeros as many as the longest lag keep its end from meeting the beginning.
+    points = scipy.fft.next_fast_len(run.samples + longest, real=True)
+
+    def transformed(row: Real) -> tuple[Complex, float]:
+        centred = row.astype(np.float64)
+        centred -= centred.mean()
+        return scipy.fft.rfft(centred, points), float(np.sqrt(centred @ centred))
+
+    first, size = transformed(run.values[0])
+    np.conj(first, out=first)
+    rows = np.empty((len(run.channels) - 1, 2 * longest + 1))
+    for row, values in zip(rows, run.values[1:], strict=True):
+        spectrum, own = transformed(values)
+        spectrum *= first
+        over_lag = scipy.fft.irfft(spectrum, points)
+        row[:longest], row[longest:] = over_lag[-longest:], over_lag[: longest + 1]
+        row /= size * own
     return CrossCorrelation(
-        lag_s=np.arange(-longest, longest + 1) / series.sample_rate_hz,
-        values=np.stack(rows),
-        responses=series.channels[1:],
-        reference=series.channels[0],
+        lag_s=np.arange(-longest, longest + 1) / run.sample_rate_hz,
+        values=rows,
+        responses=run.channels[1:],
+        reference=run.channels[0],
     )
 
 
-def _up_to(whole: CrossCorrelation, longest_s: float, band_hz: tuple[float, float]) -> CrossCorrelation:
-    """Cut a correlation to the lags that are asked for; where a higher one lies beyond, a peak has to stand inside.
+def _near_peak(
+    reference: TimeSeries, response: TimeSeries, longest_s: float, band_hz: tuple[float, float]
+) -> CrossCorrelation:
+    """Correlate a pair up to the lag that is asked for; where a higher one lies beyond, a peak has to stand inside.
 
     Unrelated signals of bandwidth B correlate by chance with a deviation of 1/sqrt(2 B T) (Bendat & Piersol 2010,
     ch. 8).
     """
-    step_s = float(whole.lag_s[1] - whole.lag_s[0])
-    inside = np.abs(whole.lag_s) < longest_s + 0.5 * step_s
+    pair = _beside(reference, response)
+    longest = round(longest_s * pair.sample_rate_hz)
+    whole = _correlated(pair, None)
+    reach = whole.lag_s.size // 2
+    if not 0 < longest < reach:
+        return _correlated(pair, longest)
+    inside = slice(reach - longest, reach + longest + 1)
     # A correlation reaches to half the record.
     independent = 4 * (band_hz[1] - band_hz[0]) * float(whole.lag_s[-1])
-    by_chance = np.sqrt(2 * np.log(inside.sum() / BY_CHANCE) / independent)
+    by_chance = np.sqrt(2 * np.log((2 * longest + 1) / BY_CHANCE) / independent)
     for channel, row in zip(whole.responses, np.abs(whole.values), strict=True):
         best, near = int(row.argmax()), row[inside]
         is_peak = 0 < near.argmax() < near.size - 1 and near.max() > by_chance
@@ -238,7 +256,8 @@ def _up_to(whole: CrossCorrelation, longest_s: float, band_hz: tuple[float, floa
                 f"{channel.name}: no peak of the correlation stands within {longest_s:g} s, and the highest, "
                 f"{row[best]:.2f}, lies at {whole.lag_s[best]:.4g} s; look for delays as long as that"
             )
-    return replace(whole, lag_s=whole.lag_s[inside], values=whole.values[:, inside])
+    # A view would hold all of the correlation in memory.
+    return replace(whole, lag_s=whole.lag_s[inside].copy(), values=whole.values[:, inside].copy())
 
 
 def _within(series: TimeSeries, low_hz: float, high_hz: float) -> TimeSeries:
@@ -250,16 +269,23 @@ def _within(series: TimeSeries, low_hz: float, high_hz: float) -> TimeSeries:
     return series if high_hz >= nyquist_hz else lowpass(series, high_hz=high_hz).series
 
 
+def _beside(reference: TimeSeries, response: TimeSeries) -> TimeSeries:
+    both = (reference, response)
+    return replace(
+        reference,
+        values=np.concatenate([one.values for one in both]),
+        valid=np.concatenate([measured_samples(one) for one in both]),
+        channels=(*reference.channels, *response.channels),
+    )
+
+
 def _fitted(
-    pair: TimeSeries,
-    row: int,
-    correlation: CrossCorrelation,
-    band_hz: tuple[float, float],
-    resolution_hz: float | None,
+    pair: TimeSeries, correlation: CrossCorrelation, band_hz: tuple[float, float], resolution_hz: float | None
 ) -> _Delay:
     from scipy.special import chdtri
 
-    best = int(np.abs(correlation.values[row]).argmax())
+    coefficients = correlation.values[0]
+    best = int(np.abs(coefficients).argmax())
     shift = round(float(correlation.lag_s[best]) * pair.sample_rate_hz)
     spectra = cross_spectra(_shifted(pair, shift), resolution_hz=resolution_hz)
     lines = (spectra.frequency_hz >= band_hz[0]) & (spectra.frequency_hz <= band_hz[1]) & (spectra.frequency_hz > 0)
@@ -270,7 +296,7 @@ def _fitted(
             f"no line lies between {band_hz[0]:g} and {band_hz[1]:g} Hz; widen the band, or ask for finer lines"
         )
     omega = 2 * np.pi * spectra.frequency_hz[lines]
-    cross = spectra.density[0, 1, lines] * np.sign(correlation.values[row, best])
+    cross = spectra.density[0, 1, lines] * np.sign(coefficients[best])
     power = spectra.density[0, 0, lines].real * spectra.density[1, 1, lines].real
     coherence = np.divide(np.abs(cross) ** 2, power, out=np.zeros(power.size), where=power > 0)
     averages = max(spectra.provenance.effective_averages, 1.0)
