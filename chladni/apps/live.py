@@ -30,6 +30,7 @@ from chladni.spectral.windows import Window
 if TYPE_CHECKING:
     from chladni.robots.robot import Robot
     from chladni.robots.torque_residual import TorqueResidual
+    from chladni.signals.waterfall import Waterfall
 
 #: How long a source is waited for; a state comes at least as often while samples do.
 POLL_S: Final = 0.02
@@ -38,6 +39,8 @@ GATHER_S: Final = 0.01
 #: How often averages are renewed, and modes looked for.
 AVERAGES_EVERY_S: Final = 0.5
 MODES_EVERY_S: Final = 5.0
+#: ... and waterfalls, which are large: several at a time would be most of the memory that is used.
+WATERFALLS_EVERY_S: Final = 2.5
 #: How often memory that is free is given back to the system.
 TRIM_EVERY_S: Final = 60.0
 #: Windows that wait to be compared with what is usual; a minute of them, or more.
@@ -154,6 +157,7 @@ class _Session:
         self._spectra_due = Schedule(AVERAGES_EVERY_S)
         self._pairs_due = Schedule(2 * AVERAGES_EVERY_S)
         self._levels_due = Schedule(2 * AVERAGES_EVERY_S)
+        self._falls_due = Schedule(WATERFALLS_EVERY_S)
         self._trim_due = Schedule(TRIM_EVERY_S)
         self._torques: dict[tuple[Channel, ...], TorqueResidual | None] = {}
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="modes")
@@ -289,6 +293,7 @@ class _Session:
         if not self._grids:
             return False
         fresh = self._in_turn(self._spectra_due, self._renew_spectra, ended=ended)
+        self._in_turn(self._falls_due, self._renew_waterfalls, ended=ended)
         self._in_turn(self._levels_due, self._renew_levels, ended=ended)
         self._in_turn(self._pairs_due, self._renew_response, ended=ended)
         if self._options.modes_every_s > 0:
@@ -314,7 +319,7 @@ class _Session:
                 self._once(str(error))
 
     def _renew_spectra(self, ended: bool) -> None:
-        found: dict[str, list[Any]] = {name: [] for name in ("densities", "exponential", "peak_hold", "waterfalls")}
+        found: dict[str, list[Any]] = {name: [] for name in ("densities", "exponential", "peak_hold")}
         for channels, grid in self._grids.items():
             rate_hz = self._samples.rate_hz(channels, fitted=ended)
             averages = grid.averages
@@ -322,8 +327,15 @@ class _Session:
                 found["densities"] += averages.densities("linear", sample_rate_hz=rate_hz)
                 found["exponential"] += averages.densities("exponential", sample_rate_hz=rate_hz)
                 found["peak_hold"] += averages.densities("peak-hold", sample_rate_hz=rate_hz)
-                found["waterfalls"].append(averages.waterfall(sample_rate_hz=rate_hz))
         self._values |= {name: tuple(some) for name, some in found.items()}
+
+    def _renew_waterfalls(self, ended: bool) -> None:
+        falls: list[Waterfall] = []
+        self._values["waterfalls"] = ()
+        for channels, grid in self._grids.items():
+            with self._waiting_for_more(ended):
+                falls.append(grid.averages.waterfall(sample_rate_hz=self._samples.rate_hz(channels, fitted=ended)))
+        self._values["waterfalls"] = tuple(falls)
 
     def _renew_levels(self, ended: bool) -> None:
         found: dict[str, list[Any]] = {"levels": [], "severities": []}

@@ -14,7 +14,7 @@ from chladni.signals.errors import EstimateError
 from chladni.spectral.segment_spectra import run_all
 
 # Lines handled together, so that a product still sits in the cache when it's added to the sum.
-LINES_TOGETHER = 512
+LINES_TOGETHER = 128
 LINES_TURNED = 64
 # Channels squared in one call of BLAS: of fewer, the calls cost more than the pairs that nobody looks at.
 SQUARED_TOGETHER = 4
@@ -71,9 +71,6 @@ class _Sum(ABC):
         """See `SegmentAverage`."""
         count = spectra.shape[1]
         weights = self.decay ** np.arange(count - 1, -1, -1)
-        # A root of the weight on each spectrum puts the whole weight on each product.
-        if self.decay != 1:
-            spectra = spectra * np.sqrt(weights)[:, np.newaxis]
         self._fade(count)
         self.weight += float(weights.sum())
         # Seen as reals, the last axis is Re, Im of the first channel, Re, Im of the second, ...
@@ -81,7 +78,11 @@ class _Sum(ABC):
 
         def accumulate(first: int) -> None:
             lines = slice(first, first + LINES_TOGETHER)
-            self.products[lines] += self._of(parts[lines])
+            some = parts[lines]
+            if self.decay != 1:
+                # A root of the weight on each spectrum puts the whole weight on each product.
+                some = some * np.sqrt(weights)[:, np.newaxis]
+            self.products[lines] += self._of(some)
 
         run_all(accumulate, range(0, len(parts), LINES_TOGETHER), executor)
 

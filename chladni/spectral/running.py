@@ -29,9 +29,10 @@ from chladni.spectral.windows import Window
 DEFAULT_SEGMENT_S: Final = 2.0
 #: Memory of the pairs of channels of a default segment.
 PAIRS_BYTES: Final = 1 << 27
-#: Powers that a running waterfall holds, at most, and slices at least.
+#: Powers that a running waterfall holds, at most; slices at least, and at most: as many as its picture has rows.
 WATERFALL_VALUES: Final = 1 << 22
 FEWEST_SLICES: Final = 16
+MOST_SLICES: Final = 420
 #: After a longer silence the waterfall begins anew.
 LONGEST_SILENCE_S: Final = 600.0
 #: Time constant of exponential averages.
@@ -251,8 +252,9 @@ class RunningAverages:
                 overlap=plan.overlap,
             )
         slices = WATERFALL_VALUES // (len(self.channels) * (plan.samples // 2 + 1))
+        slices = min(MOST_SLICES, max(FEWEST_SLICES, slices))
         return WaterfallAccumulator(
-            self.channels, self.sample_rate_hz, plan, max_slices=min(512, max(FEWEST_SLICES, slices))
+            self.channels, self.sample_rate_hz, plan, max_slices=slices, reserved_slices=slices
         )
 
 

@@ -107,6 +107,8 @@ class WaterfallAccumulator:
         Segments and their window.
     max_slices
         As for `waterfall`.
+    reserved_slices
+        Slices whose memory is taken with the first segments already, so that it stays as it is from then on.
     """
 
     def __init__(
@@ -116,13 +118,14 @@ class WaterfallAccumulator:
         segmentation: Segmentation,
         *,
         max_slices: int = 512,
+        reserved_slices: int = 16,
     ) -> None:
         self.channels = tuple(channels)
         self.sample_rate_hz = sample_rate_hz
         self.segmentation = segmentation
         self._window = window_samples(segmentation.window, segmentation.samples)
         # An even number can always be halved by averaging pairs.
-        self._slices = _Slices(most=max_slices - max_slices % 2)
+        self._slices = _Slices(max_slices - max_slices % 2, reserved_slices)
         self._start_ns: int | None = None
         self._position = 0
         self._held = HeldSamples()
@@ -194,13 +197,12 @@ class WaterfallAccumulator:
         self._position = start + block.samples
 
     def _assembled(self, rate_hz: float) -> Waterfall:
-        power, number = self._slices.slices()
         plan, slices = self.segmentation, self._slices
         scale = one_sided_weights(plan.samples) / (rate_hz * np.sum(self._window**2))
         return Waterfall(
-            time_s=(number * plan.hop + plan.samples / 2) / rate_hz,
+            time_s=(slices.numbers() * plan.hop + plan.samples / 2) / rate_hz,
             frequency_hz=line_frequencies_hz(plan.samples, rate_hz),
-            values=power * scale.astype(power.dtype),
+            values=slices.scaled(scale),
             channels=self.channels,
             start_time_ns=self._start_ns or 0,
             bandwidth_hz=noise_bandwidth_bins(self._window) * rate_hz / plan.samples,
@@ -227,51 +229,83 @@ def _plan(rate_hz: float, known: int | None, resolution_hz: float | None, **opti
 
 
 class _Slices:
-    """A bounded list of power spectra, which halves itself by averaging neighbours when it's full."""
+    """A bounded run of power spectra, which halves itself by averaging neighbours when it's full.
 
-    def __init__(self, most: int) -> None:
+    Parameters
+    ----------
+    most
+        Slices at most, an even number.
+    reserved
+        Slices whose memory is taken at the first, and written to, so that it doesn't grow up to there.
+    """
+
+    def __init__(self, most: int, reserved: int) -> None:
         self.most = most
         self.group = 1
         self.count = 0
-        self._means: list[Real] = []
+        self._reserved = min(reserved, most)
+        #: ``[slice, channel, frequency]``, of which so many are whole.
+        self._means = np.empty((0, 0, 0))
+        self._whole = 0
         # Sum of the segments of the group that is open, and how many they are. The segments themselves would be as
         # many as the log is long.
-        self._sum: Real | None = None
+        self._sum = np.empty((0, 0))
         self._open = 0
 
     def add(self, segments: Real) -> None:
         """Add powers ``[segment, channel, frequency]``, in order."""
+        if not self._means.size:
+            self._sum = np.zeros(segments.shape[1:])
+            self._means = np.full((self._reserved, *segments.shape[1:]), 0.0)
         for power in segments:
             self.count += 1
             self._open += 1
-            self._sum = power.copy() if self._sum is None else self._sum + power
+            self._sum += power
             if self._open == self.group:
                 self._close()
 
-    def slices(self) -> tuple[NDArray[np.floating], Real]:
-        """Give ``[channel, slice, frequency]`` and the mean segment number of each slice."""
-        means = self._means if self._sum is None else [*self._means, self._sum / self._open]
-        first = np.arange(len(means)) * self.group
+    def scaled(self, scale: Real) -> NDArray[np.floating]:
+        """Give ``[channel, slice, frequency]`` times a factor ``[frequency]``; last the mean of what is open."""
+        _, channels, lines = self._means.shape
+        whole = self._means[: self._whole]
+        given = np.empty(
+            (channels, self._whole + (self._open > 0), lines), _precision(whole, self._sum / max(self._open, 1))
+        )
+        # Straight to its place: for a live source this comes again and again, and copies would swell its memory.
+        np.multiply(whole.transpose(1, 0, 2), scale, out=given[:, : self._whole], casting="same_kind")
+        if self._open:
+            given[:, self._whole] = self._sum / self._open * scale
+        return given
+
+    def numbers(self) -> Real:
+        """Give the mean segment number of each slice."""
+        first = np.arange(self._whole + (self._open > 0)) * self.group
         last = np.minimum(first + self.group, self.count) - 1
-        power = np.stack(means, axis=1)
-        return power.astype(_precision(power)), (first + last) / 2
+        return (first + last) / 2
 
     def _close(self) -> None:
-        if len(self._means) == self.most:
-            pairs = zip(self._means[::2], self._means[1::2], strict=True)
-            self._means = [(one + other) / 2 for one, other in pairs]
+        if self._whole == self.most:
+            self._whole //= 2
+            # A pair is read no later than its mean is written.
+            for place in range(self._whole):
+                np.add(self._means[2 * place], self._means[2 * place + 1], out=self._means[place])
+                self._means[place] /= 2
             # What is open becomes the first half of a group twice as long.
             self.group *= 2
             return
-        if self._sum is not None:
-            self._means.append(self._sum / self._open)
-        self._sum, self._open = None, 0
+        if self._whole == len(self._means):
+            grown = np.empty((min(self.most, 2 * self._whole), *self._sum.shape))
+            grown[: self._whole] = self._means
+            self._means = grown
+        np.divide(self._sum, self._open, out=self._means[self._whole])
+        self._whole += 1
+        self._sum[:], self._open = 0.0, 0
 
 
-def _precision(power: Real) -> type[np.float32 | np.float64]:
-    """Single precision where it holds the powers ``[channel, slice, frequency]``, and those 16 digits below them."""
+def _precision(whole: Real, last: Real) -> type[np.float32 | np.float64]:
+    """Single precision where it holds the powers of all slices, and those 16 digits below them."""
     single = np.finfo(np.float32)
-    largest = np.fmax.reduce(power, axis=(1, 2), initial=0.0)
+    largest = np.fmax(np.fmax.reduce(whole, axis=(0, 2), initial=0.0), np.fmax.reduce(last, axis=1, initial=0.0))
     fits = (largest == 0) | ((largest > single.tiny / np.finfo(np.float64).eps) & (largest < single.max))
     return np.float32 if fits.all() else np.float64
 

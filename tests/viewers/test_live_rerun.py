@@ -4,6 +4,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ from rerun.blueprint.components import PlayState
 from chladni.signals.live_state import LiveEvent, LiveState
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.time_series import TimeSeries
+from chladni.spectral.waterfall import waterfall
 from chladni.viewers.rerun.live_targets import Painter, RecordingFile, Target
+from chladni.viewers.rerun.waiting_states import MOST_BYTES, WaitingStates
 from tests.viewers.rrd import Contents
 
 RATE_HZ, START_NS = 1000.0, 1_700_000_000_000_000_000
@@ -139,6 +142,25 @@ def test_a_slow_viewer_holds_nothing_up_and_what_it_lacks_is_told() -> None:
     # A state is a tenth of a second; one more was shown, or several until there was room.
     assert 64 <= len(slow.drawn) < 200
     assert float(lacking) >= 0.1 * (200 - len(slow.drawn))
+
+
+def test_states_that_wait_are_bounded_in_memory() -> None:
+    waiting = WaitingStates()
+    # Half of what may wait, each.
+    large = states(3, samples=MOST_BYTES // 32)
+    assert [waiting.put(state, patience_s=0.0) for state in large] == [True, True, False]
+    assert len(waiting.take()) == 2
+    assert waiting.put(large[2], patience_s=0.0)
+    waiting.end()
+    assert [len(waiting.take()) for _ in range(2)] == [1, 0]
+
+
+def test_of_states_that_wait_only_the_last_holds_its_waterfall() -> None:
+    waiting = WaitingStates()
+    fall = waterfall(states(1, samples=4000)[0].series[0])
+    for state in states(3):
+        waiting.put(replace(state, waterfalls=(fall,)), patience_s=0.0)
+    assert [one.waterfalls for one in waiting.take()] == [(), (), (fall,)]
 
 
 class Closed(Slow):

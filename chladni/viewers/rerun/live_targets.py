@@ -3,10 +3,8 @@
 import os
 import queue
 import threading
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -22,12 +20,11 @@ from chladni.viewers.rerun.drawing import APPLICATION
 from chladni.viewers.rerun.lifetimes import end_unused_streams
 from chladni.viewers.rerun.live import LiveDrawing, rehearse
 from chladni.viewers.rerun.process import LOOPBACK, free_port, page_address, start, stop
+from chladni.viewers.rerun.waiting_states import WaitingStates
 
 if TYPE_CHECKING:
     from subprocess import Popen
 
-#: States that wait for a slow viewer or disk; beyond, they are left out of the picture.
-WAITING: Final = 64
 #: States written at a time, between looks at the size of the file.
 TOGETHER: Final = 4
 #: A recording may hold its source up for so long at a state: longer than any disk needs that works.
@@ -284,7 +281,7 @@ class Painter:
 
     def __init__(self, target: Target) -> None:
         self.target = target
-        self._states: queue.Queue[LiveState | None] = queue.Queue(WAITING)
+        self._waiting = WaitingStates()
         self._told: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._left_out_s = 0.0
         self._failed = threading.Event()
@@ -298,29 +295,19 @@ class Painter:
             told.append(self._told.get())
         if self._failed.is_set():
             return tuple(told)
-        try:
-            self._states.put(state, timeout=self.target.patience_s or None, block=self.target.patience_s > 0)
-        except queue.Full:
+        if not self._waiting.put(state, patience_s=self.target.patience_s):
             if not self._left_out_s:
                 told.append(f"{self.target.what} can't follow: pictures are left out of it; the averages go on")
             self._left_out_s += sum(one.duration_s for one in state.series[:1])
-        else:
-            if self._left_out_s:
-                told.append(f"{self.target.what} follows again; {self._left_out_s:.3g} s are missing in it")
-                self._left_out_s = 0.0
+        elif self._left_out_s:
+            told.append(f"{self.target.what} follows again; {self._left_out_s:.3g} s are missing in it")
+            self._left_out_s = 0.0
         return tuple(told)
 
     def close(self) -> tuple[str, ...]:
         """Draw what waits, and let go of the target; give what there is to tell."""
-        end_s = time.monotonic() + LAST_S * (1 if self.target.patience_s == 0 else 12)
-        while self._thread.is_alive():
-            try:
-                self._states.put(None, timeout=0.1)
-                break
-            except queue.Full:
-                if time.monotonic() > end_s:
-                    break
-        self._thread.join(timeout=max(0.1, end_s - time.monotonic()))
+        self._waiting.end()
+        self._thread.join(timeout=LAST_S * (1 if self.target.patience_s == 0 else 12))
         told = []
         if self._thread.is_alive():
             told.append(f"{self.target.what} didn't take its end in time; it lacks the last pictures")
@@ -336,16 +323,11 @@ class Painter:
 
     def _run(self) -> None:
         self._try(self.target.prepare)
-        more = True
-        while more:
-            states = [self._states.get()]
-            with suppress(queue.Empty):
-                while states[-1] is not None:
-                    states.append(self._states.get_nowait())
-            more = states[-1] is not None
-            waiting = [state for state in states if state is not None]
-            if waiting and not self._failed.is_set():
-                self._try(partial(self.target.draw, waiting))
+        while states := self._waiting.take():
+            if not self._failed.is_set():
+                self._try(partial(self.target.draw, states))
+            # Their memory is let go of before the next ones are waited for.
+            states.clear()
         self._try(self.target.close)
 
     def _try(self, work: Callable[[], None]) -> None:
