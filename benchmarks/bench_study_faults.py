@@ -14,19 +14,18 @@ import argparse
 import os
 import random
 import shutil
-import subprocess
 import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
+from small_disk import small_disk
 from study_logs import SHORT, tables, write_logs
 
 import chladni
@@ -122,17 +121,6 @@ class Run:
         for row in found.table("channels").to_pylist():
             counts[row["log"]] += row["samples"] or 0
         return [log for log in self.logs if counts[log] < samples and log not in told]
-
-
-@contextmanager
-def small_disk(folder: Path, kilobytes: int) -> Iterator[Callable[[], object]]:
-    """Mount a small disk, and give what makes it large."""
-    folder.mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", folder], check=True)
-    try:
-        yield lambda: subprocess.run(["mount", "-o", "remount,size=64m", folder], check=True)
-    finally:
-        subprocess.run(["umount", folder], check=True)
 
 
 def one(run: Run, fault: str, rng: random.Random, store: Store, samples: int) -> tuple[str, list[str]]:
