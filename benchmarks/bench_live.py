@@ -56,7 +56,7 @@ class Generator:
         self.noise = np.random.default_rng(0).standard_normal((channels, 16 * self.block)).astype(np.float32)
         self.number = 0
 
-    def rate_hz(self, _channels: Any, **_options: bool) -> float | None:
+    def rate_hz(self, _channels: Any, /, **_options: bool) -> float | None:
         """The rate is exact."""
         return None
 

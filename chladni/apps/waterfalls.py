@@ -50,11 +50,8 @@ def measure_waterfalls(
         constant = grid.constant()
         if constant:
             left_out.append(f"channels that never change are left out: {some_of(constant)}")
-        rows = [row for row, channel in enumerate(whole.channels) if channel.name not in constant]
-        if rows:
-            found.append(
-                replace(whole, values=whole.values[rows], channels=tuple(whole.channels[row] for row in rows))
-            )
+        if moving := [channel.name for channel in whole.channels if channel.name not in constant]:
+            found.append(whole.select(moving))
     if not found:
         raise EstimateError(f"{log.path.name}: no spectrum over time could be made: {'; '.join(left_out)}")
     return (replace(found[0], provenance=found[0].provenance.with_notes(*left_out)), *found[1:])

@@ -281,7 +281,7 @@ class _Slices:
         """Give the mean segment number of each slice."""
         first = np.arange(self._whole + (self._open > 0)) * self.group
         last = np.minimum(first + self.group, self.count) - 1
-        return (first + last) / 2
+        return np.asarray((first + last) / 2, dtype=np.float64)
 
     def _close(self) -> None:
         if self._whole == self.most:

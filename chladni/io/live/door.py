@@ -35,7 +35,7 @@ class LiveSamples(Protocol):
     def silent_channels(self) -> tuple[str, ...]:
         """Channels that give nothing at present."""
 
-    def rate_hz(self, channels: Sequence[Channel], *, fitted: bool = True) -> float | None:
+    def rate_hz(self, channels: Sequence[Channel], /, *, fitted: bool = True) -> float | None:
         """Rate of a grid, given by its channels, as it's known by now."""
 
     def receive(self, timeout_s: float, /) -> Samples:

@@ -134,7 +134,7 @@ class LiveInstrument:
         """All channels come together."""
         return ()
 
-    def rate_hz(self, channels: Sequence[Channel], *, fitted: bool = True) -> float | None:  # noqa: ARG002
+    def rate_hz(self, _channels: Sequence[Channel], /, **_fitted: bool) -> float | None:
         """The rate is that of the instrument's own clock."""
         return None
 

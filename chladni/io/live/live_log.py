@@ -113,7 +113,7 @@ class LiveLog:
         """Channels that give nothing at present."""
         return tuple(name for grid in self._grids for name in grid.silent_channels)
 
-    def rate_hz(self, channels: Sequence[Channel], *, fitted: bool = True) -> float | None:
+    def rate_hz(self, channels: Sequence[Channel], /, *, fitted: bool = True) -> float | None:
         """Rate of a grid, given by its channels, as all stamps so far tell it; `fitted` takes a moment."""
         names = {channel.name for channel in channels}
         for grid in self._grids:
