@@ -134,6 +134,18 @@ def test_advice_of_the_estimators_is_printed_once() -> None:
     assert page.texts.count("resolution is too <coarse>") == 1
 
 
+def test_what_stands_among_the_findings_is_told_once_and_its_channels_are_listed() -> None:
+    response = synthetic.frequency_response()
+    noted = replace(response, provenance=replace(response.provenance, notes=("told as a finding", "told here")))
+    page = report_html(Study(title="s", response=noted, findings=("told as a finding",)), interactive=False)
+    assert page.count("told as a finding") == page.count("told here") == 1
+    channels = page.partition("<h2>Channels</h2>")[2].partition("<h2>")[0]
+    for channel in (*response.references, *response.responses):
+        assert channel.name in channels
+    # Without waveforms no rate is known; a column of nothing is none.
+    assert "Rate [Hz]" not in channels
+
+
 def test_report_is_the_same_every_time() -> None:
     study = Study(title="psd", densities=(synthetic.density(),))
     assert report_html(study) == report_html(study)

@@ -10,7 +10,7 @@ from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.envelope import envelope_figures
 from chladni.viewers.figures.frequency_response import response_figures
-from chladni.viewers.figures.levels import level_figures
+from chladni.viewers.figures.levels import level_figures, severity_figures
 from chladni.viewers.figures.mac import cross_mac_figure, mac_figures
 from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
@@ -39,6 +39,7 @@ __all__ = [
     "response_figures",
     "save_album",
     "save_figures",
+    "severity_figures",
     "stabilisation_figures",
     "synthesis_figures",
     "waterfall_figures",

@@ -12,7 +12,7 @@ from chladni.viewers.figures.complexity import complexity_figures
 from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.envelope import envelope_figures
 from chladni.viewers.figures.frequency_response import response_figures
-from chladni.viewers.figures.levels import level_figures
+from chladni.viewers.figures.levels import level_figures, severity_figures
 from chladni.viewers.figures.log_axis import USUAL, Scales
 from chladni.viewers.figures.mac import mac_figures
 from chladni.viewers.figures.mode_shapes import mode_shape_figures
@@ -50,6 +50,7 @@ class Album:
             {
                 "waveforms": waveform_figures(study),
                 "levels": level_figures(study),
+                "severities": severity_figures(study),
                 "octaves": octave_figures(study),
                 "envelopes": envelope_figures(study),
                 "cepstra": cepstrum_figures(study),

@@ -10,6 +10,7 @@ from chladni.signals.arrays import Real
 from chladni.signals.levels import Levels, RunningLevels, Severity
 from chladni.signals.study import Study
 from chladni.signals.time_series import NS_PER_S
+from chladni.viewers.drawing import with_breaks
 from chladni.viewers.figures.log_axis import logarithmic
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
@@ -24,10 +25,12 @@ PEAK_OPACITY = 0.45
 ZONE_COLOURS = ("#e3f3e6", "#f6f6d8", "#fdebd3", "#fbdcdc")
 # Above what is shown, so that a quiet machine's zone is seen with the boundary above it.
 HEADROOM = 1.15
+# Windows that follow each other are one step apart, but for rounding.
+MISSING_STEP = 1.5
 
 
 def level_figures(study: Study) -> dict[str, Figure]:
-    """Draw running levels, one figure for each band and group of channels of one unit, by name; and severities.
+    """Draw running levels, one figure for each band and group of channels of one unit, by name.
 
     Solid lines are RMS, pale ones peaks, each about the mean of its window.
     """
@@ -38,7 +41,14 @@ def level_figures(study: Study) -> dict[str, Figure]:
             for place, one in enumerate(study.levels, start=1)
             for column in range(1, len(one.bands_hz) + 1)
             for group in groups(one.channels)
-        } | {
+        }
+
+
+def severity_figures(study: Study) -> dict[str, Figure]:
+    """Draw severities over time on the zones of the machine's class, by name."""
+    style = Style.of(study)
+    with look():
+        return {
             f"severity {place}.{page}": _severity_figure(one, group, style)
             for place, one in enumerate(study.severities, start=1)
             for page, group in enumerate(groups(one.channels), start=1)
@@ -159,5 +169,8 @@ def _span(axes: Axes, running: RunningLevels, style: Style) -> None:
 
 
 def _line(axes: Axes, time_s: Real, values: Real, **looks: Any) -> None:
+    # Windows without a sample aren't listed: where they're missing the line is, too.
+    steps_s = np.diff(time_s)
+    breaks = np.flatnonzero(steps_s > MISSING_STEP * np.min(steps_s, initial=np.inf)) + 1
     # A line needs two points.
-    axes.plot(time_s, values, marker="." if time_s.size == 1 else None, **looks)
+    axes.plot(*with_breaks(time_s, values, breaks), marker="." if time_s.size == 1 else None, **looks)

@@ -15,8 +15,9 @@ from chladni.viewers.mode_tables import has_mac, mode_ticks
 # Up to so many columns every cell has its number; up to a few more, those that aren't small.
 ALL_NUMBERED, ANY_NUMBERED = 10, 24
 SMALL = 0.2
-# A number is white on the dark half of the scale.
+# A number is light on the dark half of the scale. Neither is a grey, which a dark page would turn over.
 DARK_BELOW = 0.55
+LIGHT, DARK = "#fffde0", "#00001f"
 TICKS = 24
 
 
@@ -92,7 +93,7 @@ def _draw_numbers(axes: Axes, mac: Real) -> None:
             ha="center",
             va="center",
             fontsize=6.5 if columns <= ALL_NUMBERED else 4.5,
-            color="white" if value < DARK_BELOW else "black",
+            color=LIGHT if value < DARK_BELOW else DARK,
         )
 
 

@@ -21,6 +21,8 @@ MAP_IN, CUTS_IN = 3.0, (2.2, 1.2)
 # Circles along an order; more run into a band.
 CIRCLES = 60
 LARGEST_CIRCLE_POINTS = 14.0
+# Of the largest amplitude of a channel: below, a phase is mostly that of noise, and hides the others.
+LEAST_SHARE = 0.01
 
 
 def order_figures(maps: Sequence[OrderMap], cuts: Sequence[OrderCuts]) -> dict[str, Figure]:
@@ -74,7 +76,7 @@ def _cuts_figure(cuts: OrderCuts, row: int, label: str) -> Figure:
     figure, (sizes, phases) = sheet(list(CUTS_IN), sharex=True)
     draw_order_sizes(sizes, cuts, row)
     draw_order_phases(phases, cuts, row)
-    phases.set_xlabel(along(cuts)[1])
+    phases.set_xlabel(f"{along(cuts)[1]}; phases of amplitudes above {LEAST_SHARE:.0%} of the largest")
     _title(figure, label)
     return figure
 
@@ -97,8 +99,10 @@ def draw_order_sizes(axes: Axes, cuts: OrderCuts, row: int) -> None:
 def draw_order_phases(axes: Axes, cuts: OrderCuts, row: int) -> None:
     """Draw the phases of one channel's orders into given axes."""
     where, _ = along(cuts)
+    amplitude = np.abs(cuts.values[row])
+    least = LEAST_SHARE * np.nanmax(amplitude, initial=0.0)
     for place in range(cuts.orders.size):
-        phase = np.angle(cuts.values[row, place], deg=True)
+        phase = np.where(amplitude[place] >= least, np.angle(cuts.values[row, place], deg=True), np.nan)
         line = with_breaks(where, phase, phase_wraps(phase))
         axes.plot(*line, color=paint(ON_LIGHT[place % len(ON_LIGHT)]))
     axes.set_ylabel("Phase [deg]")

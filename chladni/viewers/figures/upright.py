@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.transforms import ScaledTranslation
 
 from chladni.viewers.figures.peak_labels import LETTERS_POINTS
 from chladni.viewers.mode_tables import hertz
@@ -30,14 +29,14 @@ def name_above(axes: Axes, names: Sequence[tuple[float, str]]) -> float:
     if not shown:
         return 0.0
     places = np.array([((at - low) / (high - low), 0.0) for at, _ in shown])
-    above = ScaledTranslation(0, GAP_POINTS / 72, axes.figure.dpi_scale_trans)
     for row in spread(places, apart=(ROOM, 1.0)):
         at, colour = shown[row]
-        axes.text(
-            at,
-            1.0,
+        axes.annotate(
             f"{hertz(at)} Hz",
-            transform=axes.get_xaxis_transform() + above,
+            (float(places[row, 0]), 1.0),
+            xytext=(0.0, GAP_POINTS),
+            xycoords="axes fraction",
+            textcoords="offset points",
             rotation=90,
             ha="center",
             va="bottom",

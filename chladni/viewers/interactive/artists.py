@@ -148,7 +148,7 @@ def _draw_read_out(axes: Axes, target: Target) -> None:
     """Put an unseen line below the curves of each x axis, whose box tells the values of all of them."""
     groups: dict[bytes, list[Line2D]] = {}
     for line in axes.lines:
-        if _places(axes, line) == (True, True) and line.get_linestyle() != "None":
+        if np.size(line.get_xdata()) and _places(axes, line) == (True, True) and line.get_linestyle() != "None":
             groups.setdefault(target.along(line.get_xdata(orig=False)).tobytes(), []).append(line)
     for lines in groups.values():
         columns = {f"y{place}": packed(target.up(line.get_ydata())) for place, line in enumerate(lines)}
@@ -192,11 +192,14 @@ def _draw_line(axes: Axes, target: Target, line: Line2D) -> None:
         return
     if id(line) in target.columns:
         source, place = target.columns[id(line)]
-        target.name(_stroke(target, line, source, place, look), line, colour)
     else:
         place = "y"
-        x = packed(target.along(line.get_xdata(orig=False)))
-        source = ColumnDataSource({"x": x, place: packed(target.up(line.get_ydata()))})
+        x, y = target.along(line.get_xdata(orig=False)), target.up(line.get_ydata())
+        # A legend shows the look of a first point, which a line for its word alone doesn't have.
+        columns = (x, y) if x.size else (np.array([np.nan]), np.array([np.nan]))
+        source = ColumnDataSource(dict(zip(("x", place), map(packed, columns), strict=True)))
+    if line.get_linestyle() != "None":
+        target.name(_stroke(target, line, source, place, look), line, colour)
     if line.get_marker() not in (None, "None", "", " "):
         renderer = _marks(target, line, source, place)
         if line.get_linestyle() == "None":

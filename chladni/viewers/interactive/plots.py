@@ -14,6 +14,7 @@ from bokeh.models import (
     LinearAxis,
     LogAxis,
     LogScale,
+    LogTicker,
     Range1d,
     Toolbar,
     ToolProxy,
@@ -23,7 +24,7 @@ from bokeh.plotting import figure as bokeh_figure
 from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateFormatter, ConciseDateFormatter, DateFormatter
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedFormatter
+from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter
 
 from chladni.viewers.figures.log_axis import DecibelFormatter
 from chladni.viewers.interactive.artists import (
@@ -44,6 +45,8 @@ LEFT, RIGHT, BAR = 74, 16, 62
 # Room for names inside the top of the frame.
 NAMES_SHARE, UPRIGHT_SHARE = 0.10, 0.22
 SQUARE = 400
+# Words of a legend that find room side by side.
+COLUMNS, SQUARE_COLUMNS = 8, 3
 PIXELS_A_LETTER = 5.6
 COLOUR_BAR = "<colorbar>"
 
@@ -151,7 +154,7 @@ def _plot(
         target = _target(plot, one, axes, cells=cells)
         draw_artists(one, target)
         if legend and target.items and one is axes:
-            _add_legend(plot, target)
+            _add_legend(plot, target, columns=SQUARE_COLUMNS if square else COLUMNS)
     bars = _add_bars(plot, axes)
     name = bool(plot.xaxis[0].axis_label)
     around = TOP + AXIS * numbered + AXIS_NAME * name + TITLE * bool(plot.title.text) + LEGEND * legend
@@ -274,6 +277,9 @@ def _dress(plot: Any, axes: Axes, figure: Figure, *, numbered: bool) -> None:
     plot.title.text_font_style = "normal"
     plot.xgrid.grid_line_color = plot.ygrid.grid_line_color = FAINT
     plot.xaxis.axis_label = inert(axes.get_xlabel()) or None
+    if axes.get_yscale() == "log":
+        # Numbers of a single decade, 1 to 10, would stand on each other.
+        plot.yaxis.ticker = LogTicker(mantissas=[1, 2, 5], desired_num_ticks=5)
     plot.yaxis.axis_label = _fitted(inert(axes.get_ylabel() or _supported(axes)), _frame_in(figure, axes)) or None
     for axis in (*plot.xaxis, *plot.yaxis):
         _dressed(axis)
@@ -282,11 +288,16 @@ def _dress(plot: Any, axes: Axes, figure: Figure, *, numbered: bool) -> None:
         plot.xaxis.axis_label = None
     for axis, of_figure in ((plot.xaxis, axes.xaxis), (plot.yaxis, axes.yaxis)):
         formatter = of_figure.get_major_formatter()
-        if isinstance(formatter, FixedFormatter):
+        if isinstance(of_figure.get_major_locator(), FixedLocator) and isinstance(
+            formatter, FixedFormatter | FuncFormatter
+        ):
             ticks = [float(tick) for tick in of_figure.get_majorticklocs()]
-            names = [inert(name) for name in formatter.seq]
+            names = [inert(formatter(tick, place)) for place, tick in enumerate(ticks)]
             axis.ticker = FixedTicker(ticks=ticks)
-            axis.major_label_overrides = dict(zip(ticks, names, strict=False))
+            axis.major_label_overrides = dict(zip(ticks, names, strict=True))
+    if not axes.yaxis.get_tick_params().get("labelleft", True):
+        # Numbered where the row begins.
+        plot.yaxis.major_label_text_font_size = "0px"
 
 
 def _fitted(name: str, height_in: float) -> str:
@@ -308,12 +319,12 @@ def _dressed(axis: Any) -> Any:
     return axis
 
 
-def _add_legend(plot: Any, target: Target) -> None:
+def _add_legend(plot: Any, target: Target, *, columns: int) -> None:
     plot.add_layout(
         Legend(
             items=target.items,
             orientation="horizontal",
-            ncols=min(len(target.items), 8),
+            ncols=min(len(target.items), columns),
             click_policy="hide",
             background_fill_alpha=0.0,
             border_line_color=None,

@@ -213,7 +213,7 @@ def _captions(found: Diagnosis) -> Mapping[str, str]:
         "spectra": "Spectra of the errors and of what was measured." + (" Mean over the windows." if windows else ""),
         "map": f"Density of the gap over band and time, before and {after}; outputs over their RMS.",
         "force": "Force that the model lacks, recovered without assuming a law"
-        + ("; black: the law that was named." if drawn else "."),
+        + ("; dots, and the thin line: the law that was named." if drawn else "."),
         "shares": ("In colour: the site that was named." if coloured else "")
         or ("Of what the best parameters leave." if found.left is not None else "Shares of the gap."),
     }

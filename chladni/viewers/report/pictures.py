@@ -98,7 +98,10 @@ def sections(pictures: Pictures, album: Album) -> dict[str, str]:
             ("synthesis", "Error: root of the squares that the modes leave over those of the measured function."),
         ),
         "Waveforms": shown(("waveforms", "Long records are drawn by the extremes of each stretch.")),
-        "Levels": shown(("levels", "Solid: RMS of each window. Pale: its peak about the mean.")),
+        "Levels": shown(
+            ("levels", "Solid: RMS of each window. Pale: its peak about the mean."),
+            ("severities", "RMS of each window; without samples there is none."),
+        ),
         "Power spectral densities": shown(("densities", f"One-sided. {_SIGMA}")),
         "Octave bands": shown(("octaves", "Summed from spectral lines.")),
         "Envelope spectra": shown(("envelopes", "Dashed: frequencies of the bearing, and their multiples.")),

@@ -29,7 +29,12 @@ def peak_table(peaks: Sequence[Peak], style: Style, *, channels: str) -> str:
 def channel_table(study: Study, style: Style) -> str:
     """Tabulate the channels: label in the figures, full name, unit, role, place, rate and length."""
     headings = ("Label", "Channel", "Unit", "Role", "Point", "Direction", "Rate [Hz]", "Length [s]")
-    return table(headings, _channel_rows(study, style), numbers=(6, 7))
+    rows = list(_channel_rows(study, style))
+    # What is known of no channel, such as its place without a setup, has no column.
+    known = [place for place in range(len(headings)) if any(row[place] for row in rows)]
+    numbers = [number for number, place in enumerate(known) if place in {6, 7}]
+    shown = [[row[place] for place in known] for row in rows]
+    return table([headings[place] for place in known], shown, numbers=numbers)
 
 
 def _channel_rows(study: Study, style: Style) -> Iterator[tuple[str, ...]]:
@@ -39,6 +44,7 @@ def _channel_rows(study: Study, style: Style) -> Iterator[tuple[str, ...]]:
             seen.add(channel.name)
             yield (*_place(channel, style), f"{series.sample_rate_hz:.6g}", f"{series.duration_s:.6g}")
     others = [channel for density in study.densities for channel in density.channels]
+    others += [] if study.response is None else [*study.response.references, *study.response.responses]
     others += [] if study.modes is None else [*study.modes.references, *study.modes.channels]
     for channel in others:
         # Spectra and modes may be shown without their waveforms; their channels are listed all the same.
@@ -70,7 +76,8 @@ def method_table(study: Study) -> str:
         "Detrend",
     )
     shown = table(headings, [_account(account) for account in accounts], numbers=(2, 3, 5, 6, 7))
-    notes = dict.fromkeys(note for account in accounts for note in account.notes)
+    # What stands among the findings is told once.
+    notes = dict.fromkeys(note for account in accounts for note in account.notes if note not in study.findings)
     advice = "".join(element("li", escaped(note)) for note in notes)
     return shown + (element("ul", advice) if advice else "")
 
