@@ -15,7 +15,7 @@ from chladni import Diagnosis, Model, explained_model
 
 POSITION, FORCE = "/damper.position[0]", "/damper.effort[0]"
 #: Name of the log, and the seconds of it that are diagnosed: some strokes tell as much as all.
-LOGS = {"mr_0A": 12.0, "mr_0.5A": 12.0, "mr_10mm_1A": 5.0, "mr_1A": 12.0}
+LOGS = {"mr_0A": 12.0, "mr_0.5A": 12.0, "mr_1A": 12.0, "mr_10mm_1A": 5.0}
 
 
 def force_error(model: Model, series: chladni.TimeSeries) -> float:
