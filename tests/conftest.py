@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+import gc
 import os
 from collections.abc import Generator, Iterator
 from pathlib import Path
@@ -20,10 +21,22 @@ settings.register_profile("many", deadline=None)
 settings.load_profile("chladni")
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
-    """No test module has examples in its docstrings; looking for them takes a tenth of the collection."""
-    return [one for one in (yield) if not (isinstance(one, DoctestModule) and file_path.is_relative_to(TESTS))]
+class Examples:
+    """Modules without an example are not searched for one: that would take a tenth of the collection."""
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_collect_file(self, file_path: Path) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+        """Leave out what could collect nothing; no test module has examples in its docstrings."""
+        return [one for one in (yield) if not (isinstance(one, DoctestModule) and _has_no_example(file_path))]
+
+
+def _has_no_example(path: Path) -> bool:
+    return path.is_relative_to(TESTS) or b">>>" not in path.read_bytes()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Heed that outside of this folder, too."""
+    config.pluginmanager.register(Examples())
 
 
 @pytest.hookimpl(wrapper=True)
@@ -43,6 +56,12 @@ def pytest_make_collect_report(
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Workers agree on one order, whichever they collected in."""
     items.sort(key=lambda item: item.path.parts)
+
+
+def pytest_collection_finish() -> None:
+    """Tests and modules live to the end: each page that is closed would look through a million objects of theirs."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

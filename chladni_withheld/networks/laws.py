@@ -277,7 +277,9 @@ def _keep(state: Matrix, elements: Elements, kept: Matrix, moved: Matrix) -> Non
             d = _across(state, ends[number, 0], ends[number, 1], 0)
             way, p = d - kept[number, SLIDERS], numbers[number]
             slider_forces(way, kept[number], p[:SLIDERS], p[SLIDERS : 2 * SLIDERS], moved[number])
-            kept[number, :SLIDERS] = moved[number]
+            # One by one: a slice's checks of its shape would take a third of the compilation.
+            for slider in range(SLIDERS):
+                kept[number, slider] = moved[number, slider]
             kept[number, SLIDERS] = d
 
 
@@ -328,9 +330,10 @@ def integrate(
     kept, moved = np.zeros((count, SLIDERS + 1)), np.zeros((count, SLIDERS))
     state, ahead, rates, total = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
     drive, results, acted = np.zeros(inputs), np.zeros((2, count)), np.zeros(count)
-    readings, reading = np.empty((len(view), steps)), np.zeros(len(view))
+    readings = np.empty((len(view), steps))
     for step in range(steps):
-        ahead[:] = state
+        for row in range(size):
+            ahead[row] = state[row]
         for stage in range(4):
             part = (0.0, 0.5, 0.5, 1.0)[stage]
             # A drive that jumps at a step's end has not yet jumped in that step.
@@ -339,10 +342,11 @@ def integrate(
             t = start_s + (step + part) * step_s
             slopes(t, ahead, drive, flow, push, elements, kept, rates, results, moved)
             if stage == 0:
-                _read(view, state, rates, results[0], drive, reading)
-                readings[:, step] = reading
-                acted += results[1]
-                total[:] = 0.0
+                _read(view, state, rates, results[0], drive, readings[:, step])
+                for number in range(count):
+                    acted[number] += results[1, number]
+                for row in range(size):
+                    total[row] = 0.0
             for row in range(size):
                 total[row] += (1.0, 2.0, 2.0, 1.0)[stage] / 6 * rates[row]
                 ahead[row] = state[row] + (0.5, 0.5, 1.0, 0.0)[stage] * step_s * rates[row]

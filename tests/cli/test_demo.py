@@ -18,7 +18,7 @@ def tour(tmp_path_factory):
     return folder / "demo", json.loads(finished.stdout), finished.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_everything_found_is_true_within_its_uncertainty(tour):
     _, document, _ = tour
     assert len(document["comparisons"]) == 2 * 5 + 2 * 5 + 2
@@ -28,7 +28,7 @@ def test_everything_found_is_true_within_its_uncertainty(tour):
         assert abs(one["found"] - one["truth"]) <= max(4 * one["std"], 0.0011), one
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_log_setup_recording_report_and_figures_are_written(tour):
     folder, document, _ = tour
     names = {path.name for path in folder.iterdir()}
@@ -37,7 +37,7 @@ def test_log_setup_recording_report_and_figures_are_written(tour):
     assert len(document["files"]) >= 8
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_people_read_what_was_found_beside_the_truth(tour):
     _, _, said = tour
     assert "Found beside the truth" in said

@@ -77,7 +77,7 @@ def hung(
     model, data = robot.model, mujoco.MjData(robot.model)
     every = round(1.0 / RATE_HZ / model.opt.timestep)
     places = [one.position for one in robot.joints]
-    trunk = model.body("trunk").id
+    trunk, calves = model.body("trunk").id, [model.body(name).id for name in ("left_calf", "right_calf")]
     data.qpos[places] = command[:, 0]
     mujoco.mj_forward(model, data)
     start = data.xpos[trunk] + [0.0, 0.0, model.body_mass[trunk:].sum() * 9.81 / CORD]
@@ -94,14 +94,14 @@ def hung(
                 mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, trunk, speed, 0)
                 pull = CORD * (start - data.xpos[trunk]) - 10 * DAMPED * speed[3:]
                 twist = TWIST * data.xmat[trunk].reshape(3, 3) @ turn - DAMPED * speed[:3]
-                feet = ("left_calf", "right_calf") if sample < stands_s * RATE_HZ else ()
-                data.xfrc_applied[trunk] = [*(0.0 if feet else 1.0) * pull, *twist]
-                for one in ("left_calf", "right_calf"):
-                    body = data.body(one)
-                    arm = body.xmat.reshape(3, 3) @ [0.0, 0.0, -0.2] - (body.xipos - body.xpos)
-                    push = pull / 2 if feet else np.zeros(3)
+                stands = sample < stands_s * RATE_HZ
+                data.xfrc_applied[trunk, :3] = 0.0 if stands else pull
+                data.xfrc_applied[trunk, 3:] = twist
+                data.xfrc_applied[calves] = 0.0
+                for calf in calves if stands else ():
+                    arm = data.xmat[calf].reshape(3, 3) @ [0.0, 0.0, -0.2] - (data.xipos[calf] - data.xpos[calf])
                     # A force of a body acts at its centre of mass.
-                    data.xfrc_applied[body.id] = [*push, *np.cross(arm, push)]
+                    data.xfrc_applied[calf] = [*pull / 2, *np.cross(arm, pull / 2)]
             mujoco.mj_step(model, data)
             given[:, sample] = data.qfrc_actuator[dofs]
             felt.append(data.sensordata.copy())

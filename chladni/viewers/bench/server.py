@@ -97,14 +97,18 @@ class BenchServer:
     def run(self, ready: Callable[[], None] | None = None) -> None:
         """Serve until `stop` or Ctrl-C; `ready` is called once pages can be had."""
         # A quarter of a million objects of the toolkit would be looked through now and then, a tenth of a second each
-        # time, in the middle of a turn of a knob; all of them live as long as the pages do.
-        gc.collect()
-        gc.freeze()
+        # time, in the middle of a turn of a knob; all of them live as long as the pages do. What the program that
+        # serves pages froze before stays frozen.
+        frozen = gc.get_freeze_count() > 0
+        if not frozen:
+            gc.collect()
+            gc.freeze()
         try:
             # A loop of its own, made here and closed here: whatever else runs in the process keeps its.
             asyncio.run(self._serve(ready))
         finally:
-            gc.unfreeze()
+            if not frozen:
+                gc.unfreeze()
 
     def stop(self) -> None:
         """End `run`, or give the port back when it never ran; may be called from any thread."""

@@ -44,7 +44,7 @@ def test_what_is_about_a_prefix_is_told_as_one(factor: float, words: str) -> Non
     assert f"; about the factor of a prefix such as {words}" in found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_log_in_millimetres_is_told_in_the_advice() -> None:
     log = measured(seconds=3.0)
     found = diagnose(arm(), [replace(log, outputs=1e3 * log.outputs)], leave_out=frozenset(CATALOGUE))

@@ -86,7 +86,7 @@ def test_the_recovered_force_follows_the_law(friction: Diagnosis) -> None:
     assert np.corrcoef(found.force[inside], found.law_force[inside])[0, 1] > 0.8
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_input_gives_the_same_document_on_any_number_of_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     log = measured((chladni.attached("saturation", "shaker", {"limit": 120.0}),), seconds=2.0)
     found, out = [], frozenset(CATALOGUE) - {"saturation", "coulomb_friction"}
@@ -103,7 +103,7 @@ def test_the_same_input_gives_the_same_document_on_any_number_of_cores(monkeypat
         pytest.param("hardening_stiffness", "hand", {"cubic": 3e10}, marks=pytest.mark.nightly),
         pytest.param("saturation", "shaker", {"limit": 120.0}, marks=pytest.mark.nightly),
         pytest.param("delay", "shaker", {"delay": 2.3e-3}, marks=pytest.mark.nightly),
-        ("gain_error", "acc_arm", {"gain": 1.2}),
+        pytest.param("gain_error", "acc_arm", {"gain": 1.2}, marks=pytest.mark.nightly),
         pytest.param("time_offset", "acc_column", {"offset": 1.4e-3}, marks=pytest.mark.nightly),
     ],
 )

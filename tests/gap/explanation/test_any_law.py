@@ -72,6 +72,7 @@ TURNING_STIFFNESS = EffectKind(
 )
 
 
+@pytest.mark.nightly
 def test_a_stiffness_that_turns_with_a_shaft_is_followed() -> None:
     shaft = chladni.attached(TURNING_STIFFNESS, "shoulder", {"change": 6e4, "frequency": 9.37})
     assert left_at(shaft, "shoulder") < 0.12

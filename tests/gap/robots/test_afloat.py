@@ -75,6 +75,7 @@ def test_friction_is_named_where_the_log_has_commands_and_efforts(tmp_path: Path
     assert {one.site for one in found.causes} == {"left_hip"}
 
 
+@pytest.mark.nightly
 def test_a_delay_of_all_commands(tmp_path: Path) -> None:
     found = found_of(tmp_path, servo=' delay="0.012" nsample="40"')
     assert named(found) == {("delay", "all commands")}
