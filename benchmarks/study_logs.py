@@ -56,6 +56,7 @@ class Usage:
 
     client_mb: float = 0.0
     cpu_s: dict[int, float] = field(default_factory=dict)
+    memory_mb: dict[int, float] = field(default_factory=dict)
 
     def watch(self, pid: int, done: threading.Event) -> None:
         """Look at it until it's done."""
@@ -65,6 +66,7 @@ class Usage:
                 self.client_mb = max(self.client_mb, root.memory_info().rss / 2**20)
                 for one in (root, *root.children(recursive=True)):
                     times = one.cpu_times()
+                    self.memory_mb[one.pid] = max(self.memory_mb.get(one.pid, 0.0), one.memory_info().rss / 2**20)
                     self.cpu_s[one.pid] = max(self.cpu_s.get(one.pid, 0.0), times.user + times.system)
             except psutil.Error:
                 continue

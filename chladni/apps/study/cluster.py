@@ -120,7 +120,7 @@ def _of_this_machine(workers: int | None, *, dashboard: bool) -> "Iterator[Clien
     with (
         TemporaryDirectory(prefix="chladni-workers-", ignore_cleanup_errors=True) as folder,
         quiet(),
-        _settings(),
+        settings(),
         LocalCluster(
             n_workers=count,
             threads_per_worker=1,
@@ -165,7 +165,7 @@ def _of_scheduler(scheduler: str, keys: Keys) -> "Iterator[Client]":
     if told and not encrypted:
         raise SetupError("--tls-ca, --tls-cert and --tls-key are for tls:// addresses; leave them out")
     security = Security(require_encryption=encrypted, **told)
-    with quiet(), _settings():
+    with quiet(), settings():
         try:
             client = Client(scheduler, security=security, timeout=CONNECT_S, set_as_default=False)
         except (OSError, TypeError, ValueError, RuntimeError) as error:
@@ -176,7 +176,8 @@ def _of_scheduler(scheduler: str, keys: Keys) -> "Iterator[Client]":
 
 
 @contextmanager
-def _settings() -> "Iterator[None]":
+def settings() -> "Iterator[None]":
+    """Run Dask as studies do: what fails is told by them, and nothing watches that nobody looks at."""
     import dask
     import distributed  # noqa: F401  # brings its settings into those of dask
 
@@ -190,6 +191,13 @@ def _settings() -> "Iterator[None]":
             "distributed.comm.timeouts.connect": f"{CONNECT_S:g}s",
             "distributed.admin.tick.limit": "1h",
             "distributed.diagnostics.nvml": False,
+            # What watches for nobody takes a part of the cores that work: samples of the stack a hundred times a
+            # second, a clock at fifty, copies that are looked for where each answer is in one place.
+            "distributed.worker.profile.enabled": False,
+            "distributed.admin.tick.interval": "1s",
+            "distributed.admin.system-monitor.interval": "5s",
+            "distributed.scheduler.active-memory-manager.start": False,
+            "distributed.worker.memory.monitor-interval": "5s",
             # Workers say nothing either: they find this when they start.
             _BEFORE_WORKERS: {**dask.config.get(_BEFORE_WORKERS), "DASK_LOGGING__DISTRIBUTED": "critical"},
         }
