@@ -191,3 +191,13 @@ class Robot:
         # MuJoCo's first body is the world.
         first, second = (1 + self.links.index(one.link) for one in (joint, other))
         return bool(self.model.body_parentid[second] == first)
+
+    def hanging(self, joint: RobotJoint) -> tuple[str, ...]:
+        """Give the link that a joint moves, and all that hang on it."""
+        first = 1 + self.links.index(joint.link)
+        found = {first}
+        # MuJoCo numbers a body after the one that it hangs on.
+        for body in range(first + 1, 1 + len(self.links)):
+            if int(self.model.body_parentid[body]) in found:
+                found.add(body)
+        return tuple(self.links[body - 1] for body in sorted(found))

@@ -29,7 +29,7 @@ from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forward import Confirmed, confirmed, machine_of
 from chladni.gap.robots.next_measurement import next_measurement
 from chladni.gap.robots.pictures import joint_motion, torque_maps, torque_signals
-from chladni.gap.robots.pushes import Push
+from chladni.gap.robots.pushes import PUSHED, Push
 from chladni.gap.robots.remarks import pushes_told, remarks_on
 from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.solved import Solved
@@ -174,7 +174,7 @@ class Answer:
             model=solved.torques.robot.name,
             logs=(solved.torques.log.log,),
             verdict=self.verdict,
-            causes=tuple(one.cause for one in self.named),
+            causes=tuple(one.cause for one in self.named) or tuple(map(_pushing, self.solved.pushes)),
             ranking=tuple(_ranking(self.weighed)),
             where=_where(solved, self._contest.nothing),
             left=_where(solved, self._best) if self.verdict == "unknown" else None,
@@ -243,6 +243,22 @@ class Weighed:
             variant=self.term.variant if self.term.word == "encoder_offset" else None,
             share=self.share,
         )
+
+
+def _pushing(one: Push) -> Cause:
+    """Tell of what pushed as the part of ``unknown`` that has a place and a time."""
+    return Cause(
+        effect=PUSHED,
+        site=one.links[0],
+        probability=one.probability,
+        group=one.links,
+        alternatives=(),
+        parameters={
+            "start": FittedNumber(value=one.start_s, std=None, unit="s"),
+            "end": FittedNumber(value=one.end_s, std=None, unit="s"),
+            "torque": FittedNumber(value=one.torque, std=None, unit=one.unit),
+        },
+    )
 
 
 def _weighed(solved: Solved, place: int) -> Weighed:
@@ -407,7 +423,11 @@ def _where(solved: Solved, fit: Fit) -> Where:
             for share, name in sorted(zip(shares, names, strict=True), key=lambda one: -one[0])
         ),
         regimes=tuple(replace(one, unit=units[one.variable]) for one in regime_shares(residual, drive, regimes)),
-        times=time_shares(residual, drive, sample_rate_hz=rate),
+        times=tuple(
+            replace(one, start_s=float(at_s[0]), end_s=float(at_s[1]))
+            for one in time_shares(residual, drive, sample_rate_hz=rate)
+            for at_s in [torques.at_s([one.start_s, one.end_s])]
+        ),
     )  # fmt: skip
 
 

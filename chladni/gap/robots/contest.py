@@ -398,11 +398,14 @@ class Contest:
         return found
 
     def course(self, fit: Fit) -> tuple[Real, Real]:
-        """Give ``[coarse]``: energy that a fit leaves over all joints, whitened, and what noise alone would leave."""
-        rest = (self.torques.missing - self.explained(fit)) * self._whiten
+        """Give ``[joint, coarse]`` twice: energy that a fit leaves, whitened, and what noise alone would leave.
+
+        Of the stretches that take no part as well.
+        """
         joints = slice(len(self.torques.joints))
-        there = self.torques.numbers_a_sample * np.sum(self._whiten[joints] > 0, axis=0)
-        return np.sum(rest[joints] ** 2, axis=0), there
+        there = self.torques.numbers_a_sample * self.torques.without(()).moving[joints]
+        rest = (self.torques.missing - self.explained(fit))[joints] / self.torques.noise[joints, None]
+        return np.asarray(there * rest**2), np.asarray(there, dtype=np.float64)
 
     def explained(self, fit: Fit) -> Real:
         """Give ``[joint, coarse]``: missing torque that the numbers of a fit explain."""

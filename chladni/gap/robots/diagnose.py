@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.robots.answer import Answer
+from chladni.gap.robots.pushes import PUSHED
 from chladni.gap.robots.solved import solved
 from chladni.gap.robots.support import require_in_the_air
 from chladni.gap.robots.torques import torques_of
@@ -13,8 +14,8 @@ from chladni.signals.linear_algebra import in_one_thread
 
 StepProgress = Callable[[str, float], None]
 
-#: Words of docs/robots.md that have no column: what they'd name is unknown, and leaving them out changes nothing.
-WITHOUT_COLUMN = ("external_force",)
+#: Words of docs/robots.md that have no column: what they name is part of ``unknown``.
+WITHOUT_COLUMN = (PUSHED,)
 
 
 @in_one_thread()

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.ndimage import correlate1d
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
@@ -80,6 +81,11 @@ class Motion:
         rate = self.log.sample_rate_hz
         ends = round(_ENDS / self.cutoff_hz * rate)
         return np.concatenate([np.arange(a + ends, b - ends, self._stride) for a, b in self.stretches])
+
+    def at_s(self, grid_s: ArrayLike) -> Real:
+        """Give the log's time of times on the coarse grid, whose samples follow one another without a break."""
+        times = self.log.time_s[self.kept]
+        return np.interp(np.asarray(grid_s) * self.rate_hz, np.arange(times.size), times)
 
     @property
     def _stride(self) -> int:

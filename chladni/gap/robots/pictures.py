@@ -52,7 +52,7 @@ def torque_signals(torques: Torques, explained: Real) -> GapSignals:
         after=after,
         noise_rms=noise,
         noise_density=np.repeat((noise**2 / (rate / 2.0))[:, None], lines, axis=1),
-        map_time_s=np.interp(time_s * rate, np.arange(seconds.size), seconds),
+        map_time_s=torques.at_s(time_s),
         map_frequency_hz=frequency_hz,
         gap_map=density,
         gap_map_after=gap_map(drive - after, drive, rate)[2],

@@ -1,18 +1,25 @@
 """Stretches of a log in which something pushes: a torque of any shape for a while, which no law explains."""
 
 from dataclasses import dataclass
-from math import log
+from math import log, log1p
 
 import numpy as np
 from scipy.ndimage import label, uniform_filter1d
+from scipy.special import chdtri, expit
 
-from chladni.gap.calibration import ANOTHER, DETAILS, FAR, LITTLE, MOST, QUARTER
+from chladni.gap.calibration import ANOTHER, DETAILS, FAR, LAPSE, LITTLE, MOST, QUARTER, TEMPER
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.torques import Torques
 from chladni.signals.arrays import Mask, Real
 
 #: Periods of the cutoff over which energy is looked at: what a filter of its length can tell apart.
 _WINDOW = 2.0
+
+#: Word of what pushes: a named part of ``unknown``.
+PUSHED = "external_force"
+
+#: From the log's start, s.
+Stretch = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,35 +32,56 @@ class Push:
         From the log's start.
     joints
         At which it's felt, most first.
-    torque
+    links
+        That may be pushed: what the farthest of these joints moves, then what hangs on it, where a force whose line
+        meets the axes between would be felt no farther.
+    torque, unit
         Largest at the first of them, N m (N).
+    probability
+        That something pushed, against all that laws explain.
     """
 
     start_s: float
     end_s: float
     joints: tuple[str, ...]
+    links: tuple[str, ...]
     torque: float
+    unit: str
+    probability: float
 
 
-def pushed(contest: Contest, fit: Fit) -> tuple[tuple[float, float], ...]:
+def pushed(contest: Contest, fit: Fit) -> tuple[Stretch, ...]:
     """Give the stretches that hold most of what a fit leaves beyond the noise; none where it's spread."""
-    torques = contest.torques
     energy, count = contest.course(fit)
     if not count.any():
         return ()
-    size = max(round(_WINDOW / torques.cutoff_hz * torques.rate_hz), 1)
-    ratio = _mean(energy, size) / np.maximum(_mean(count, size), np.mean(count) * LITTLE)
-    inside = ratio > max(FAR, LITTLE * float(np.max(ratio)))
-    excess = np.maximum(energy - count, 0.0)
+    size = max(round(_WINDOW / contest.torques.cutoff_hz * contest.torques.rate_hz), 1)
+    # A push on one joint of many is no smaller than on one of few.
+    ratio = np.max(_mean(energy, size) / np.maximum(_mean(count, size), np.mean(count) * LITTLE), axis=0)
+    inside = ratio > max(_by_chance(size * float(np.max(count)), count.size / size), LITTLE * float(np.max(ratio)))
+    excess = np.sum(energy - count, axis=0)
     if not inside.any() or inside.mean() > QUARTER or np.sum(excess[inside]) < MOST * np.sum(excess):
         return ()
-    times = torques.log.time_s[torques.kept]
+    times = contest.torques.log.time_s[contest.torques.kept]
     marks, found = label(inside)
     bounds = [np.flatnonzero(marks == each + 1)[[0, -1]] for each in range(found)]
-    return tuple((float(times[a]), float(times[b])) for a, b in bounds)
+    return paying(contest, fit, tuple((float(times[a]), float(times[b])) for a, b in bounds))
 
 
-def price(contest: Contest, stretches: tuple[tuple[float, float], ...]) -> float:
+def paying(contest: Contest, fit: Fit, stretches: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+    """Give those stretches in which a fit leaves more than a torque of any shape there costs."""
+    energy, count = contest.course(fit)
+    times = contest.torques.log.time_s[contest.torques.kept]
+    found = []
+    for start_s, end_s in stretches:
+        inside = (times >= start_s) & (times <= end_s)
+        beyond = max(float(np.sum((energy - count)[:, inside])) / 2.0, 0.0)
+        if DETAILS * log1p(beyond / DETAILS) > price(contest, ((start_s, end_s),)):
+            found.append((start_s, end_s))
+    return tuple(found)
+
+
+def price(contest: Contest, stretches: tuple[Stretch, ...]) -> float:
     """Give the nats that a torque of any shape in some stretches pays."""
     times = contest.torques.log.time_s
     whole = float(times[-1] - times[0])
@@ -61,24 +89,36 @@ def price(contest: Contest, stretches: tuple[tuple[float, float], ...]) -> float
     return sum(DETAILS - log(ANOTHER) + log(max(whole / max(b - a, 1e-3), 1.0)) for a, b in stretches)
 
 
-def pushes_of(contest: Contest, fit: Fit) -> tuple[Push, ...]:
-    """Tell of the stretches that were left out of a contest."""
+def pushes_of(contest: Contest, fit: Fit, nats: float) -> tuple[Push, ...]:
+    """Tell of the stretches that were left out of a contest, which brought so many nats."""
     torques = contest.torques
     rest = (torques.missing - contest.explained(fit))[: len(torques.joints)]
     times = torques.log.time_s[torques.kept]
-    return tuple(_told(torques, rest, times, a, b) for a, b in torques.away)
+    probability = (1.0 - LAPSE) * float(expit(nats / TEMPER))
+    return tuple(_told(torques, rest, (times >= a) & (times <= b), (a, b), probability) for a, b in torques.away)
 
 
-def _told(torques: Torques, rest: Real, times: Real, start_s: float, end_s: float) -> Push:
-    inside: Mask = (times >= start_s) & (times <= end_s)
+def _by_chance(numbers: float, places: float) -> float:
+    """Give the noise's power over the usual that one of many places has with a chance of a tenth."""
+    return float(chdtri(numbers, ANOTHER / places)) / numbers
+
+
+def _told(torques: Torques, rest: Real, inside: Mask, stretch: Stretch, probability: float) -> Push:
     over = np.sqrt(np.mean(rest[:, inside] ** 2, axis=1)) / torques.noise[: len(rest)] * torques.driven
     order = np.argsort(-over)
     felt = [int(row) for row in order if over[row] > max(FAR, LITTLE * over[order[0]])] or [int(order[0])]
+    joints = [torques.joints[row] for row in felt]
     return Push(
-        start_s=start_s, end_s=end_s, joints=tuple(torques.joints[row].name for row in felt),
+        start_s=stretch[0],
+        end_s=stretch[1],
+        joints=tuple(one.name for one in joints),
+        # On the farthest joint that feels it the fewest links hang.
+        links=min(map(torques.robot.hanging, joints), key=len),
         torque=float(np.max(np.abs(rest[felt[0], inside]))),
-    )  # fmt: skip
+        unit="N m" if joints[0].kind == "hinge" else "N",
+        probability=probability,
+    )
 
 
 def _mean(values: Real, size: int) -> Real:
-    return np.asarray(uniform_filter1d(values, size, mode="constant"))
+    return np.asarray(uniform_filter1d(values, size, axis=-1, mode="constant"))

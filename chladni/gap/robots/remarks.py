@@ -32,7 +32,7 @@ def pushes_told(pushes: Sequence[Push]) -> str:
     """Say where and when something pushed."""
     return " ".join(
         f"Something pushes at {some_of(one.joints)} from {one.start_s:.2f} s to {one.end_s:.2f} s, by up to "
-        f"{one.torque:.3g} N m."
+        f"{one.torque:.3g} {one.unit}."
         for one in pushes
     )
 

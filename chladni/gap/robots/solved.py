@@ -11,7 +11,7 @@ from chladni.gap.robots.body_words import OF_THE_LOG
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forms import Forms, refined
 from chladni.gap.robots.gains import Gains, guessed_gains, unknown_gains, with_gains
-from chladni.gap.robots.pushes import Push, price, pushed, pushes_of
+from chladni.gap.robots.pushes import PUSHED, Push, paying, price, pushed, pushes_of
 from chladni.gap.robots.search import searched
 from chladni.gap.robots.term import SENSES, Term
 from chladni.gap.robots.told import TOLD, Numbers
@@ -139,15 +139,29 @@ def _guessing(torques: Torques, gains: Gains) -> Torques:
 
 def _without_pushes(torques: Torques, left_out: frozenset[str], progress: Callable[[float], None]) -> Solved:
     found = _settled(Contest(torques, left_out), left_out, progress)
+    if PUSHED in left_out:
+        return found
     for fit in (found.best, found.contest.nothing):
         away = pushed(found.contest, fit)
         if not away:
             continue
-        # What pushes for a while would be taken for laws of its joints.
+        # What pushes for a while would be taken for laws of its joints; without it laws leave others less.
         other = _settled(Contest(found.torques.without(away), left_out), left_out, progress)
-        if other.best.nats - price(found.contest, away) > found.best.nats:
-            return replace(other, pushes=pushes_of(other.contest, other.best))
+        still = paying(other.contest, other.best, away)
+        if still and still != away:
+            other = _settled(Contest(found.torques.without(still), left_out), left_out, progress)
+        if still:
+            nats = other.best.nats - price(found.contest, still) - _as_quiet(found, other, left_out).nats
+            if nats > 0:
+                return replace(other, pushes=pushes_of(other.contest, other.best, nats))
     return found
+
+
+def _as_quiet(found: Solved, other: Solved, left_out: frozenset[str]) -> Fit:
+    """Search at the noise of another answer: what it leaves out hides in the level that it makes."""
+    ours, theirs = found.torques.noise, other.torques.noise
+    contest = Contest(found.torques.with_level((theirs / ours) ** 2), left_out)
+    return searched(contest, contest.again(found.best), progress=lambda _: None)
 
 
 def _settled(contest: Contest, left_out: frozenset[str], progress: Callable[[float], None]) -> Solved:

@@ -87,13 +87,17 @@ def test_a_push_is_told_with_its_joint_and_time(tmp_path: Path) -> None:
     # A push on the elbow is what a command would do that moves by as much.
     pushed = command + 0.1 * np.stack([0.0 * time_s, np.exp(-(((time_s - 6.0) / 0.15) ** 2))])
     found = diagnose_robot(robot, joint_log_of(robot, read(drives, pushed), command=command))
-    assert (found.verdict, found.causes) == ("unknown", ())
+    (cause,) = found.causes
+    assert (found.verdict, cause.effect, cause.site) == ("unknown", "external_force", robot.joint("elbow").link)
     assert found.advice is not None
     assert found.advice.startswith("Something pushes at elbow")
-    start, end = (
-        float(each) for each in found.advice.split(" from ")[1].split(", ")[0].replace(" s", "").split(" to ")
+    (when,) = found.where.times
+    for start, end in ((cause.parameters["start"].value, cause.parameters["end"].value), (when.start_s, when.end_s)):
+        assert 5.2 < start < 6.0 < end < 6.8
+    other = diagnose_robot(
+        robot, joint_log_of(robot, read(drives, pushed), command=command), leave_out=frozenset({"external_force"})
     )
-    assert 5.2 < start < 6.0 < end < 6.8
+    assert not any(one.effect == "external_force" for one in other.causes)
 
 
 def test_a_pause_of_the_loop_is_no_delay(tmp_path: Path) -> None:
