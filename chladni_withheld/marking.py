@@ -301,6 +301,11 @@ def _tells(answer: Result, hidden: folders.Hidden) -> bool:
     ]
     spans += [(_number(one.get("low")), _number(one.get("high"))) for one in where.get("regimes") or ()
               if isinstance(one, Mapping) and one.get("variable") == "time"]  # fmt: skip
+    spans += [
+        (_number(one.get("start_s")), _number(one.get("end_s")))
+        for one in where.get("times") or ()
+        if isinstance(one, Mapping)
+    ]
     middle = 0.5 * sum(float((hidden.parameters or {}).get(key, inf)) for key in ("start", "end"))
     return placed and any(low is not None and high is not None and low <= middle <= high for low, high in spans)
 

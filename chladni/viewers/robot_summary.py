@@ -66,8 +66,9 @@ def robot_sentences(found: Diagnosis) -> Iterator[str]:
 
 
 def robot_unknown(found: Diagnosis) -> Iterator[str]:
-    """Say where the torque is missing that no word explains, and what torques alone suggest."""
+    """Say what pushed, where the torque is missing that no word explains, and what torques alone suggest."""
     gap, where = found.gap, found.where
+    yield from map(_pushes, found.causes)
     errs = "torques" if gap.by == "torque" else "simulated positions"
     if gap.tuned > 1.0 and gap.by != "torque":
         yield "Something is missing that no word explains: simulated positions err by more than the motion itself."
@@ -86,6 +87,15 @@ def robot_unknown(found: Diagnosis) -> Iterator[str]:
     elif found.ranking:
         nearest = [effect_at(one.effect, one.site) for one in found.ranking[:PLACES]]
         yield f"Nearest, but not good enough: {', '.join(nearest)}."
+
+
+def _pushes(cause: Cause) -> str:
+    start, end, torque = (cause.parameters[name] for name in ("start", "end", "torque"))
+    where = cause.site if len(cause.group) == 1 else f"{cause.site} or what hangs on it"
+    return (
+        f"Something pushes {where} from {start.value:.2f} s to {end.value:.2f} s, by up to "
+        f"{engineering(torque.value, torque.std, torque.unit)} ({chance(cause.probability)})."
+    )
 
 
 def listed(parts: Sequence[str], *, word: str = "and") -> str:

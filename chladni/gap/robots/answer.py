@@ -30,7 +30,7 @@ from chladni.gap.robots.forward import Confirmed, confirmed, machine_of
 from chladni.gap.robots.next_measurement import next_measurement
 from chladni.gap.robots.pictures import joint_motion, torque_maps, torque_signals
 from chladni.gap.robots.pushes import PUSHED, Push
-from chladni.gap.robots.remarks import pushes_told, remarks_on
+from chladni.gap.robots.remarks import remarks_on
 from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.solved import Solved
 from chladni.gap.robots.term import Term
@@ -181,7 +181,7 @@ class Answer:
             gap=self.closing,
             tuned_parameters=tuned_parameters(solved),
             next_measurement=self._next_measurement(joints),
-            remarks=remarks_on(solved, joints if self.named else ()),
+            remarks=remarks_on(solved, joints, named=bool(self.named)),
             advice=_advice(self.verdict, joints, self.denied, self.solved.pushes),
             signals=torque_signals(solved.torques, self._contest.explained(told)),
             machine=machine_of(self._contest, told),
@@ -254,9 +254,9 @@ def _pushing(one: Push) -> Cause:
         group=one.links,
         alternatives=(),
         parameters={
-            "start": FittedNumber(value=one.start_s, std=None, unit="s"),
-            "end": FittedNumber(value=one.end_s, std=None, unit="s"),
-            "torque": FittedNumber(value=one.torque, std=None, unit=one.unit),
+            "start": FittedNumber(value=one.start_s, std=one.spread_s, unit="s"),
+            "end": FittedNumber(value=one.end_s, std=one.spread_s, unit="s"),
+            "torque": FittedNumber(value=one.torque, std=one.spread, unit=one.unit),
         },
     )
 
@@ -499,7 +499,7 @@ def _advice(verdict: Verdict, joints: Sequence[str], denied: Confirmed | None, p
     if verdict != "unknown":
         return None
     if pushes and not joints and denied is None:
-        return f"{pushes_told(pushes)} Nothing else is missing: look what the robot touched then."
+        return "Nothing else is missing: look what the robot touched then."
     if denied is not None:
         return (
             "What the torques suggest isn't named: simulated with it, the positions' error is "

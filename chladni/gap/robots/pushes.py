@@ -1,7 +1,7 @@
 """Stretches of a log in which something pushes: a torque of any shape for a while, which no law explains."""
 
 from dataclasses import dataclass
-from math import log, log1p
+from math import log, log1p, sqrt
 
 import numpy as np
 from scipy.ndimage import label, uniform_filter1d
@@ -14,6 +14,9 @@ from chladni.signals.arrays import Mask, Real
 
 #: Periods of the cutoff over which energy is looked at: what a filter of its length can tell apart.
 _WINDOW = 2.0
+
+#: Samples that lie farther apart than so many intervals are of two stretches.
+_GAP = 1.5
 
 #: Word of what pushes: a named part of ``unknown``.
 PUSHED = "external_force"
@@ -28,24 +31,26 @@ class Push:
 
     Attributes
     ----------
-    start_s, end_s
-        From the log's start.
+    start_s, end_s, spread_s
+        From the log's start, and their standard deviation.
     joints
         At which it's felt, most first.
     links
         That may be pushed: what the farthest of these joints moves, then what hangs on it, where a force whose line
         meets the axes between would be felt no farther.
-    torque, unit
-        Largest at the first of them, N m (N).
+    torque, spread, unit
+        Largest at the first of them, N m (N), and the noise's standard deviation there.
     probability
         That something pushed, against all that laws explain.
     """
 
     start_s: float
     end_s: float
+    spread_s: float
     joints: tuple[str, ...]
     links: tuple[str, ...]
     torque: float
+    spread: float
     unit: str
     probability: float
 
@@ -55,14 +60,17 @@ def pushed(contest: Contest, fit: Fit) -> tuple[Stretch, ...]:
     energy, count = contest.course(fit)
     if not count.any():
         return ()
-    size = max(round(_WINDOW / contest.torques.cutoff_hz * contest.torques.rate_hz), 1)
+    times, rate = contest.torques.log.time_s[contest.torques.kept], contest.torques.rate_hz
+    size = max(round(_WINDOW / contest.torques.cutoff_hz * rate), 1)
+    # Where a log begins, a push is no other than a state that nobody knows: of a motor's spring, of a bristle.
+    for first in (0, *(np.flatnonzero(np.diff(times) * rate > _GAP) + 1).tolist()):
+        energy[:, first : first + size] = count[:, first : first + size] = 0.0
     # A push on one joint of many is no smaller than on one of few.
     ratio = np.max(_mean(energy, size) / np.maximum(_mean(count, size), np.mean(count) * LITTLE), axis=0)
     inside = ratio > max(_by_chance(size * float(np.max(count)), count.size / size), LITTLE * float(np.max(ratio)))
     excess = np.sum(energy - count, axis=0)
     if not inside.any() or inside.mean() > QUARTER or np.sum(excess[inside]) < MOST * np.sum(excess):
         return ()
-    times = contest.torques.log.time_s[contest.torques.kept]
     marks, found = label(inside)
     bounds = [np.flatnonzero(marks == each + 1)[[0, -1]] for each in range(found)]
     return paying(contest, fit, tuple((float(times[a]), float(times[b])) for a, b in bounds))
@@ -111,10 +119,13 @@ def _told(torques: Torques, rest: Real, inside: Mask, stretch: Stretch, probabil
     return Push(
         start_s=stretch[0],
         end_s=stretch[1],
+        # Anywhere in the window that tells of it.
+        spread_s=_WINDOW / torques.cutoff_hz / sqrt(12.0),
         joints=tuple(one.name for one in joints),
         # On the farthest joint that feels it the fewest links hang.
         links=min(map(torques.robot.hanging, joints), key=len),
         torque=float(np.max(np.abs(rest[felt[0], inside]))),
+        spread=float(torques.noise[felt[0]]),
         unit="N m" if joints[0].kind == "hinge" else "N",
         probability=probability,
     )

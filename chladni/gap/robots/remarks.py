@@ -12,28 +12,26 @@ from chladni.io.log_info import some_of
 _MOVES = 0.05
 
 
-def remarks_on(solved: Solved, unexplained: Sequence[str]) -> tuple[str, ...]:
-    """Say what was left out while reading, what hardly moves, and where the answer leaves something."""
+def remarks_on(solved: Solved, unexplained: Sequence[str], *, named: bool) -> tuple[str, ...]:
+    """Say what was left out while reading, what hardly moves, and where and when the named causes leave something."""
     torques = solved.torques
     return (
         *torques.robot.remarks,
         *torques.log.remarks,
         *_of_joints(solved),
-        *([pushes_told(solved.pushes).removesuffix(".")] if solved.pushes else []),
+        *(_pushed(one) for one in solved.pushes if named),
         *(
             [f"at {some_of(unexplained)} no word explains what is missing beside the named causes"]
-            if unexplained
+            if named and unexplained
             else []
         ),
     )
 
 
-def pushes_told(pushes: Sequence[Push]) -> str:
-    """Say where and when something pushed."""
-    return " ".join(
-        f"Something pushes at {some_of(one.joints)} from {one.start_s:.2f} s to {one.end_s:.2f} s, by up to "
-        f"{one.torque:.3g} {one.unit}."
-        for one in pushes
+def _pushed(one: Push) -> str:
+    return (
+        f"something pushes at {some_of(one.joints)} from {one.start_s:.2f} s to {one.end_s:.2f} s, by up to "
+        f"{one.torque:.3g} {one.unit}; those seconds told nothing of the causes"
     )
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from chladni.gap.robots.diagnose import diagnose_robot
 from chladni.robots.machine import Loop, Machine, Ripple, Stop, Transmission, Uneven, as_described
+from chladni.viewers.gap_summary import headline
 from tests.robots.machines import RATE_HZ, arm, changed, commands, course, joint_log_of
 
 pytest.importorskip("mujoco")
@@ -89,11 +90,12 @@ def test_a_push_is_told_with_its_joint_and_time(tmp_path: Path) -> None:
     found = diagnose_robot(robot, joint_log_of(robot, read(drives, pushed), command=command))
     (cause,) = found.causes
     assert (found.verdict, cause.effect, cause.site) == ("unknown", "external_force", robot.joint("elbow").link)
-    assert found.advice is not None
-    assert found.advice.startswith("Something pushes at elbow")
+    assert headline(found).startswith(f"Something pushes {cause.site} from 5.")
     (when,) = found.where.times
     for start, end in ((cause.parameters["start"].value, cause.parameters["end"].value), (when.start_s, when.end_s)):
         assert 5.2 < start < 6.0 < end < 6.8
+    # 0.1 rad of the elbow's servo.
+    assert cause.parameters["torque"].value == pytest.approx(6.0, rel=0.3)
     other = diagnose_robot(
         robot, joint_log_of(robot, read(drives, pushed), command=command), leave_out=frozenset({"external_force"})
     )

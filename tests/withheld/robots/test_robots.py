@@ -294,6 +294,8 @@ def test_doubtful_gains_are_no_wrong_names():
 @pytest.mark.parametrize(("where", "told"), [
     ({"sites": [{"name": "j1", "share": 0.9}], "regimes": [{"variable": "time", "low": 3.0, "high": 3.6}]}, True),
     ({"sites": [{"name": "j1", "share": 0.9}], "regimes": [{"variable": "time", "low": 5.0, "high": 5.6}]}, False),
+    ({"sites": [{"name": "j1", "share": 0.9}], "times": [{"start_s": 3.0, "end_s": 3.6}]}, True),
+    ({"sites": [{"name": "j1", "share": 0.9}], "times": [{"start_s": 5.0, "end_s": 5.6}]}, False),
     ({"sites": [{"name": "j0", "share": 0.9}], "regimes": [{"variable": "time", "low": 3.0, "high": 3.6}]}, False),
 ])  # fmt: skip
 def test_a_push_is_told_with_its_place_and_time(where, told):
