@@ -92,9 +92,11 @@ def robot_unknown(found: Diagnosis) -> Iterator[str]:
 def _pushes(cause: Cause) -> str:
     start, end, torque = (cause.parameters[name] for name in ("start", "end", "torque"))
     where = cause.site if len(cause.group) == 1 else f"{cause.site} or what hangs on it"
+    laws = listed([effect_at(one.effect, one.site) for one in cause.alternatives])
     return (
         f"Something pushes {where} from {start.value:.2f} s to {end.value:.2f} s, by up to "
-        f"{engineering(torque.value, torque.std, torque.unit)} ({chance(cause.probability)})."
+        f"{engineering(torque.value, torque.std, torque.unit)} ({chance(cause.probability)})"
+        f"{f'; the log hardly tells it from {laws}' if laws else ''}."
     )
 
 

@@ -252,7 +252,7 @@ def _pushing(one: Push) -> Cause:
         site=one.links[0],
         probability=one.probability,
         group=one.links,
-        alternatives=(),
+        alternatives=tuple(dict.fromkeys(Candidate(effect=law.word, site=law.site) for law in one.others)),
         parameters={
             "start": FittedNumber(value=one.start_s, std=one.spread_s, unit="s"),
             "end": FittedNumber(value=one.end_s, std=one.spread_s, unit="s"),

@@ -1,14 +1,15 @@
 """Stretches of a log in which something pushes: a torque of any shape for a while, which no law explains."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log, log1p, sqrt
 
 import numpy as np
 from scipy.ndimage import label, uniform_filter1d
 from scipy.special import chdtri, expit
 
-from chladni.gap.calibration import ANOTHER, DETAILS, FAR, LAPSE, LITTLE, MOST, QUARTER, TEMPER
+from chladni.gap.calibration import ANOTHER, CLOSE, DETAILS, FAR, LAPSE, LITTLE, MOST, QUARTER, TEMPER
 from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import Torques
 from chladni.signals.arrays import Mask, Real
 
@@ -42,6 +43,8 @@ class Push:
         Largest at the first of them, N m (N), and the noise's standard deviation there.
     probability
         That something pushed, against all that laws explain.
+    others
+        Laws of these joints that the log hardly tells from it.
     """
 
     start_s: float
@@ -53,6 +56,7 @@ class Push:
     spread: float
     unit: str
     probability: float
+    others: tuple[Term, ...]
 
 
 def pushed(contest: Contest, fit: Fit) -> tuple[Stretch, ...]:
@@ -93,17 +97,23 @@ def price(contest: Contest, stretches: tuple[Stretch, ...]) -> float:
     """Give the nats that a torque of any shape in some stretches pays."""
     times = contest.torques.log.time_s
     whole = float(times[-1] - times[0])
-    # One of the places that it could be at in a log, at about its own length.
-    return sum(DETAILS - log(ANOTHER) + log(max(whole / max(b - a, 1e-3), 1.0)) for a, b in stretches)
+    # At one of the joints, and of the places that it could be at in a log at about its own length.
+    alone = DETAILS - log(ANOTHER) + log(len(contest.torques.joints))
+    return sum(alone + log(max(whole / max(b - a, 1e-3), 1.0)) for a, b in stretches)
 
 
-def pushes_of(contest: Contest, fit: Fit, nats: float) -> tuple[Push, ...]:
-    """Tell of the stretches that were left out of a contest, which brought so many nats."""
+def pushes_of(contest: Contest, fit: Fit, laws: Fit, nats: float) -> tuple[Push, ...]:
+    """Tell of the stretches that were left out of a contest, which brought so many nats more than laws."""
     torques = contest.torques
     rest = (torques.missing - contest.explained(fit))[: len(torques.joints)]
     times = torques.log.time_s[torques.kept]
     probability = (1.0 - LAPSE) * float(expit(nats / TEMPER))
-    return tuple(_told(torques, rest, (times >= a) & (times <= b), (a, b), probability) for a, b in torques.away)
+    others = laws.terms if nats < CLOSE else ()
+    found = (_told(torques, rest, (times >= a) & (times <= b), (a, b)) for a, b in torques.away)
+    return tuple(
+        replace(one, probability=probability, others=tuple(law for law in others if law.site in one.joints))
+        for one in found
+    )
 
 
 def _by_chance(numbers: float, places: float) -> float:
@@ -111,7 +121,7 @@ def _by_chance(numbers: float, places: float) -> float:
     return float(chdtri(numbers, ANOTHER / places)) / numbers
 
 
-def _told(torques: Torques, rest: Real, inside: Mask, stretch: Stretch, probability: float) -> Push:
+def _told(torques: Torques, rest: Real, inside: Mask, stretch: Stretch) -> Push:
     over = np.sqrt(np.mean(rest[:, inside] ** 2, axis=1)) / torques.noise[: len(rest)] * torques.driven
     order = np.argsort(-over)
     felt = [int(row) for row in order if over[row] > max(FAR, LITTLE * over[order[0]])] or [int(order[0])]
@@ -127,7 +137,8 @@ def _told(torques: Torques, rest: Real, inside: Mask, stretch: Stretch, probabil
         torque=float(np.max(np.abs(rest[felt[0], inside]))),
         spread=float(torques.noise[felt[0]]),
         unit="N m" if joints[0].kind == "hinge" else "N",
-        probability=probability,
+        probability=1.0,
+        others=(),
     )
 
 

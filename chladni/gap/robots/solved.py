@@ -151,25 +151,31 @@ def _without_pushes(torques: Torques, left_out: frozenset[str], progress: Callab
         if still and still != away:
             other = _settled(Contest(found.torques.without(still), left_out), left_out, progress)
         if still:
-            nats = other.best.nats - price(found.contest, still) - _as_quiet(found, other, left_out).nats
+            # What acts for a while hides in the level of noise that it makes: laws are tried at that without it.
+            level = (other.torques.noise / found.torques.noise) ** 2
+            quiet = Contest(found.torques.with_level(level), left_out)
+            law = _settled(quiet, left_out, progress, first=found.best, levels=False)
+            nats = other.best.nats - price(found.contest, still) - law.best.nats
             if nats > 0:
-                return replace(other, pushes=pushes_of(other.contest, other.best, nats))
+                return replace(other, pushes=pushes_of(other.contest, other.best, law.best, nats))
+            return law
     return found
 
 
-def _as_quiet(found: Solved, other: Solved, left_out: frozenset[str]) -> Fit:
-    """Search at the noise of another answer: what it leaves out hides in the level that it makes."""
-    ours, theirs = found.torques.noise, other.torques.noise
-    contest = Contest(found.torques.with_level((theirs / ours) ** 2), left_out)
-    return searched(contest, contest.again(found.best), progress=lambda _: None)
-
-
-def _settled(contest: Contest, left_out: frozenset[str], progress: Callable[[float], None]) -> Solved:
-    best = searched(contest, progress=progress)
+def _settled(
+    contest: Contest,
+    left_out: frozenset[str],
+    progress: Callable[[float], None],
+    *,
+    first: Fit | None = None,
+    levels: bool = True,
+) -> Solved:
+    """Search until guesses and the noise's level have settled; from the words of a fit, and at the level given."""
+    best = searched(contest, *([] if first is None else [contest.again(first)]), progress=progress)
     spread: Forms = {}
     for _ in range(_SHIFTS):
         forms, spread = refined(contest, best, contest.torques.guesses.forms)
-        leveled = contest.torques.with_level(contest.quietest(best))
+        leveled = contest.torques.with_level(contest.quietest(best)) if levels else contest.torques
         guessed = leveled.with_guesses(_guesses(contest.torques, best, forms), contest.explained(best))
         if _is_settled(contest.torques, guessed):
             break
