@@ -1,6 +1,6 @@
 """Stretches of a log in which something pushes: a torque of any shape for a while, which no law explains."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import log, log1p, sqrt
 
 import numpy as np
@@ -10,7 +10,8 @@ from scipy.special import chdtri, expit
 from chladni.gap.calibration import ANOTHER, CLOSE, DETAILS, FAR, LAPSE, LITTLE, MOST, QUARTER, TEMPER
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.term import Term
-from chladni.gap.robots.torques import Torques
+from chladni.gap.robots.torques import RIGHT, Torques
+from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Mask, Real
 
 #: Periods of the cutoff over which energy is looked at: what a filter of its length can tell apart.
@@ -71,7 +72,8 @@ def pushed(contest: Contest, fit: Fit) -> tuple[Stretch, ...]:
         energy[:, first : first + size] = count[:, first : first + size] = 0.0
     # A push on one joint of many is no smaller than on one of few.
     ratio = np.max(_mean(energy, size) / np.maximum(_mean(count, size), np.mean(count) * LITTLE), axis=0)
-    inside = ratio > max(_by_chance(size * float(np.max(count)), count.size / size), LITTLE * float(np.max(ratio)))
+    chance = _by_chance(size * contest.torques.numbers_a_sample, count.size / size)
+    inside = ratio > max(chance, LITTLE * float(np.max(ratio)))
     excess = np.sum(energy - count, axis=0)
     if not inside.any() or inside.mean() > QUARTER or np.sum(excess[inside]) < MOST * np.sum(excess):
         return ()
@@ -81,15 +83,20 @@ def pushed(contest: Contest, fit: Fit) -> tuple[Stretch, ...]:
 
 
 def paying(contest: Contest, fit: Fit, stretches: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
-    """Give those stretches in which a fit leaves more than a torque of any shape there costs."""
+    """Give those in which a fit leaves more than a torque of any shape costs, and than descriptions are right to."""
+    torques = contest.torques
     energy, count = contest.course(fit)
-    times = contest.torques.log.time_s[contest.torques.kept]
+    # At the highest torque a description errs by most.
+    rounding = RIGHT * np.max(np.abs(torques.drive - np.mean(torques.drive, axis=1, keepdims=True)), axis=1)
+    rest = _left(contest, fit)
     found = []
-    for start_s, end_s in stretches:
-        inside = (times >= start_s) & (times <= end_s)
+    for stretch in stretches:
+        inside = _inside(torques, stretch)
         beyond = max(float(np.sum((energy - count)[:, inside])) / 2.0, 0.0)
-        if DETAILS * log1p(beyond / DETAILS) > price(contest, ((start_s, end_s),)):
-            found.append((start_s, end_s))
+        pays = DETAILS * log1p(beyond / DETAILS) > price(contest, (stretch,))
+        felt = torques.driven & (np.sqrt(np.mean(rest[:, inside] ** 2, axis=1)) > rounding)
+        if pays and felt.any():
+            found.append(stretch)
     return tuple(found)
 
 
@@ -104,42 +111,53 @@ def price(contest: Contest, stretches: tuple[Stretch, ...]) -> float:
 
 def pushes_of(contest: Contest, fit: Fit, laws: Fit, nats: float) -> tuple[Push, ...]:
     """Tell of the stretches that were left out of a contest, which brought so many nats more than laws."""
-    torques = contest.torques
-    rest = (torques.missing - contest.explained(fit))[: len(torques.joints)]
-    times = torques.log.time_s[torques.kept]
+    rest = _left(contest, fit)
     probability = (1.0 - LAPSE) * float(expit(nats / TEMPER))
-    others = laws.terms if nats < CLOSE else ()
-    found = (_told(torques, rest, (times >= a) & (times <= b), (a, b)) for a, b in torques.away)
-    return tuple(
-        replace(one, probability=probability, others=tuple(law for law in others if law.site in one.joints))
-        for one in found
-    )
+    found = []
+    for stretch in contest.torques.away:
+        felt = _felt(contest.torques, rest[:, _inside(contest.torques, stretch)])
+        names = {one.name for one, _ in felt}
+        joint, torque = felt[0]
+        found.append(
+            Push(
+                start_s=stretch[0],
+                end_s=stretch[1],
+                # Anywhere in the window that tells of it.
+                spread_s=_WINDOW / contest.torques.cutoff_hz / sqrt(12.0),
+                joints=tuple(one.name for one, _ in felt),
+                # On the farthest joint that feels it the fewest links hang.
+                links=min((contest.torques.robot.hanging(one) for one, _ in felt), key=len),
+                torque=torque,
+                spread=float(contest.torques.noise[contest.torques.joints.index(joint)]),
+                unit="N m" if joint.kind == "hinge" else "N",
+                probability=probability,
+                others=tuple(law for law in laws.terms if law.site in names) if nats < CLOSE else (),
+            )
+        )
+    return tuple(found)
+
+
+def _felt(torques: Torques, rest: Real) -> list[tuple[RobotJoint, float]]:
+    """Joints at which it's felt, most first, with the largest torque at each."""
+    over = np.sqrt(np.mean(rest**2, axis=1)) / torques.noise[: len(rest)] * torques.driven
+    order = np.argsort(-over)
+    felt = [row for row in order.tolist() if over[row] > max(FAR, LITTLE * over[order[0]])] or [int(order[0])]
+    return [(torques.joints[row], float(np.max(np.abs(rest[row])))) for row in felt]
+
+
+def _left(contest: Contest, fit: Fit) -> Real:
+    """``[joint, coarse]``: torque that a fit leaves."""
+    return np.asarray((contest.torques.missing - contest.explained(fit))[: len(contest.torques.joints)])
+
+
+def _inside(torques: Torques, stretch: Stretch) -> Mask:
+    times = torques.log.time_s[torques.kept]
+    return np.asarray((times >= stretch[0]) & (times <= stretch[1]))
 
 
 def _by_chance(numbers: float, places: float) -> float:
     """Give the noise's power over the usual that one of many places has with a chance of a tenth."""
     return float(chdtri(numbers, ANOTHER / places)) / numbers
-
-
-def _told(torques: Torques, rest: Real, inside: Mask, stretch: Stretch) -> Push:
-    over = np.sqrt(np.mean(rest[:, inside] ** 2, axis=1)) / torques.noise[: len(rest)] * torques.driven
-    order = np.argsort(-over)
-    felt = [int(row) for row in order if over[row] > max(FAR, LITTLE * over[order[0]])] or [int(order[0])]
-    joints = [torques.joints[row] for row in felt]
-    return Push(
-        start_s=stretch[0],
-        end_s=stretch[1],
-        # Anywhere in the window that tells of it.
-        spread_s=_WINDOW / torques.cutoff_hz / sqrt(12.0),
-        joints=tuple(one.name for one in joints),
-        # On the farthest joint that feels it the fewest links hang.
-        links=min(map(torques.robot.hanging, joints), key=len),
-        torque=float(np.max(np.abs(rest[felt[0], inside]))),
-        spread=float(torques.noise[felt[0]]),
-        unit="N m" if joints[0].kind == "hinge" else "N",
-        probability=1.0,
-        others=(),
-    )
 
 
 def _mean(values: Real, size: int) -> Real:
