@@ -398,19 +398,19 @@ class Contest:
         return found
 
     def course(self, fit: Fit) -> tuple[Real, Real]:
-        """Give ``[joint, coarse]`` twice: energy that a fit leaves, whitened, and what one expects that's right.
+        """Give ``[joint, coarse]`` twice: energy that a fit leaves, whitened, and what noise alone would leave.
 
-        That is the noise's, and what laws' idealisations usually leave of their torque (`USUAL`). Of the stretches
-        that take no part as well.
+        Of the stretches that take no part as well.
         """
         joints = slice(len(self.torques.joints))
         there = self.torques.numbers_a_sample * self.torques.without(()).moving[joints]
-        noise = self.torques.noise[joints, None]
-        rest = (self.torques.missing - self.explained(fit))[joints] / noise
-        laws = self.explained(
-            replace(fit, numbers=np.where(np.arange(fit.numbers.size) < self.within, 0.0, fit.numbers))
-        )
-        return np.asarray(there * rest**2), np.asarray(there * (1.0 + (USUAL * laws[joints] / noise) ** 2))
+        rest = (self.torques.missing - self.explained(fit))[joints] / self.torques.noise[joints, None]
+        return np.asarray(there * rest**2), np.asarray(there, dtype=np.float64)
+
+    def of_terms(self, fit: Fit) -> Real:
+        """Give ``[row, coarse]``: what the terms explain, without tolerances."""
+        alone = np.where(np.arange(fit.numbers.size) < self.within, 0.0, fit.numbers)
+        return self.explained(replace(fit, numbers=alone))
 
     def explained(self, fit: Fit) -> Real:
         """Give ``[joint, coarse]``: missing torque that the numbers of a fit explain."""

@@ -83,18 +83,19 @@ def pushed(contest: Contest, fit: Fit) -> tuple[Stretch, ...]:
 
 
 def paying(contest: Contest, fit: Fit, stretches: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
-    """Give those in which a fit leaves more than a torque of any shape costs, and than descriptions are right to."""
+    """Give those in which a fit leaves more than a torque of any shape costs, and than one can be wrong by there."""
     torques = contest.torques
     energy, count = contest.course(fit)
-    # At the highest torque a description errs by most.
-    rounding = RIGHT * np.max(np.abs(torques.drive - np.mean(torques.drive, axis=1, keepdims=True)), axis=1)
     rest = _left(contest, fit)
+    # A description errs by most at the highest torque; a law, as where friction holds, by all that it gives.
+    changes = torques.drive - np.mean(torques.drive, axis=1, keepdims=True)
+    errs = RIGHT * np.max(np.abs(changes), axis=1) + np.max(np.abs(contest.of_terms(fit)[: len(rest)]), axis=1)
     found = []
     for stretch in stretches:
         inside = _inside(torques, stretch)
         beyond = max(float(np.sum((energy - count)[:, inside])) / 2.0, 0.0)
         pays = DETAILS * log1p(beyond / DETAILS) > price(contest, (stretch,))
-        felt = torques.driven & (np.sqrt(np.mean(rest[:, inside] ** 2, axis=1)) > rounding)
+        felt = torques.driven & (np.sqrt(np.mean(rest[:, inside] ** 2, axis=1)) > errs)
         if pays and felt.any():
             found.append(stretch)
     return tuple(found)
