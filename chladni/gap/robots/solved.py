@@ -158,7 +158,8 @@ def _without_pushes(torques: Torques, left_out: frozenset[str], progress: Callab
             nats = other.best.nats - price(found.contest, still) - law.best.nats
             if nats > 0:
                 return replace(other, pushes=pushes_of(other.contest, other.best, law.best, nats))
-            return law
+            # As quiet as they leave it.
+            return _settled(law.contest, left_out, progress, first=law.best)
     return found
 
 
