@@ -293,7 +293,7 @@ def _tells(answer: Result, hidden: folders.Hidden) -> bool:
     shares = [one for one in where.get("sites") or () if isinstance(one, Mapping)]
     largest = max(shares, key=lambda one: _number(one.get("share")) or 0.0, default={})
     forces = [one for one in answer.causes or () if one.effect == "external_force"]
-    placed = largest.get("name") in sites or any(one.site in sites for one in forces)
+    placed = largest.get("name") in sites or any(sites & {one.site, *(one.group or ())} for one in forces)
     if hidden.effect != "push":
         return placed
     spans = [

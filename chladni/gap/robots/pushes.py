@@ -7,7 +7,7 @@ import numpy as np
 from scipy.ndimage import label, uniform_filter1d
 from scipy.special import chdtri, expit
 
-from chladni.gap.calibration import ANOTHER, CLOSE, DETAILS, FAR, LAPSE, LITTLE, MOST, QUARTER, TEMPER
+from chladni.gap.calibration import ANOTHER, CLOSE, DETAILS, DOUBTED, FAR, LAPSE, LITTLE, MOST, QUARTER, TEMPER
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import RIGHT, Torques
@@ -79,26 +79,31 @@ def pushed(contest: Contest, fit: Fit) -> tuple[Stretch, ...]:
         return ()
     marks, found = label(inside)
     bounds = [np.flatnonzero(marks == each + 1)[[0, -1]] for each in range(found)]
-    return paying(contest, fit, tuple((float(times[a]), float(times[b])) for a, b in bounds))
+    stretches = [(float(times[a]), float(times[b])) for a, b in bounds]
+    return tuple(one for one in stretches if _pays(contest, energy - count, one))
 
 
 def paying(contest: Contest, fit: Fit, stretches: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
-    """Give those in which a fit leaves more than a torque of any shape costs, and than one can be wrong by there."""
-    torques = contest.torques
+    """Give those in which a fit without them leaves more than a torque of any shape costs, and than one errs by."""
+    torques, rest = contest.torques, _left(contest, fit)
     energy, count = contest.course(fit)
-    rest = _left(contest, fit)
-    # A description errs by most at the highest torque; a law, as where friction holds, by all that it gives.
+    # A description errs by most at the highest torque; a law, as where friction holds, by all that it gives; and a
+    # loop by what a step of its encoder asks. These come and go: their usual power tells little.
     changes = torques.drive - np.mean(torques.drive, axis=1, keepdims=True)
     errs = RIGHT * np.max(np.abs(changes), axis=1) + np.max(np.abs(contest.of_terms(fit)[: len(rest)]), axis=1)
-    found = []
-    for stretch in stretches:
-        inside = _inside(torques, stretch)
-        beyond = max(float(np.sum((energy - count)[:, inside])) / 2.0, 0.0)
-        pays = DETAILS * log1p(beyond / DETAILS) > price(contest, (stretch,))
-        felt = torques.driven & (np.sqrt(np.mean(rest[:, inside] ** 2, axis=1)) > errs)
-        if pays and felt.any():
-            found.append(stretch)
-    return tuple(found)
+    errs = np.maximum(errs + torques.kp * torques.resolution, np.sqrt(DOUBTED) * torques.noise[: len(rest)])
+    return tuple(
+        one
+        for one in stretches
+        if _pays(contest, energy - count, one)
+        and np.any(torques.driven & (np.sqrt(np.mean(rest[:, _inside(torques, one)] ** 2, axis=1)) > errs))
+    )
+
+
+def _pays(contest: Contest, excess: Real, stretch: Stretch) -> bool:
+    """Whether what is left in a stretch beyond noise is worth more than a torque of any shape there."""
+    beyond = max(float(np.sum(excess[:, _inside(contest.torques, stretch)])) / 2.0, 0.0)
+    return DETAILS * log1p(beyond / DETAILS) > price(contest, (stretch,))
 
 
 def price(contest: Contest, stretches: tuple[Stretch, ...]) -> float:
