@@ -16,6 +16,7 @@ from chladni.signals.errors import EstimateError, LogError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.linear_algebra import in_one_thread
 from chladni.signals.mode_set import ModeSet
+from chladni.signals.wording import counted
 
 FEWEST_LEVELS = 2
 
@@ -85,7 +86,8 @@ def locate_from_levels(
     """
     if len(logs) < FEWEST_LEVELS or len(sensors) < FEWEST_LEVELS:
         raise EstimateError(
-            f"{len(logs)} logs and {len(sensors)} sensors: a place between sensors takes two levels and two sensors "
+            f"{counted(len(logs), 'log')} and {counted(len(sensors), 'sensor')}: a place "
+            "between sensors takes two levels and two sensors "
             "at least, and three sensors to tell more than one place"
         )
     if driving_point not in sensors:

@@ -21,7 +21,7 @@ from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.live_state import EventKind, LiveEvent, LiveState
 from chladni.signals.process_memory import trim_memory
 from chladni.signals.time_series import NS_PER_S, TimeSeries
-from chladni.signals.wording import near_matches
+from chladni.signals.wording import counted, near_matches
 from chladni.spectral.change_watch import SignalChange
 from chladni.spectral.running import TIME_CONSTANT_S
 from chladni.spectral.severity import Machine
@@ -229,7 +229,10 @@ class _Session:
                 self._average(block)
             except EstimateError as error:
                 self._tell(
-                    "skipped", f"{block.samples} samples are left out of the averages: {error}", None, block.samples
+                    "skipped",
+                    f"{counted(block.samples, 'sample')} left out of the averages: {error}",
+                    None,
+                    block.samples,
                 )
                 continue
             self._end_ns = max(self._end_ns, block.start_time_ns + round(block.duration_s * NS_PER_S))

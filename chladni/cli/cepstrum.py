@@ -8,6 +8,7 @@ from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.words import number
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from chladni.signals.cepstrum import Cepstrum
@@ -55,7 +56,7 @@ def cepstrum(
 
 def _print_peaks(out: Output, found: "Cepstrum") -> None:
     out.channel_table(
-        f"{found.kind.capitalize()} cepstrum: {found.provenance.averages} averages, quefrencies up to "
+        f"{found.kind.capitalize()} cepstrum: {counted(found.provenance.averages, 'average')}, quefrencies up to "
         f"{number(1e3 * float(found.quefrency_s[-1]))} ms",
         ["channel", "peaks, the highest first [ms]", "one over them [Hz]"],
         [

@@ -18,6 +18,7 @@ from chladni.cli.opening import opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import number, unit, with_error
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from chladni.apps.live_document import EventBook
@@ -250,7 +251,7 @@ def _told(out: Output, state: "LiveState", book: "EventBook") -> tuple[str, ...]
     still = still_channels(state)
     for density, levels in zip(state.densities, state.levels, strict=False):
         out.table(
-            f"Levels after {state.time_s:.1f} s, {density.provenance.averages} averages",
+            f"Levels after {state.time_s:.1f} s, {counted(density.provenance.averages, 'average')}",
             ["channel", "RMS", "unit", "peak", "crest factor", "kurtosis"],
             [
                 [

@@ -70,7 +70,7 @@ def _print_levels(out: Output, density: "PowerSpectralDensity", document: "Docum
     spacing_hz = float(density.frequency_hz[1] - density.frequency_hz[0])
     names = {channel.name for channel in density.channels}
     out.channel_table(
-        f"Levels: {account.averages} averages ({account.effective_averages:.1f} effective) of "
+        f"Levels: {counted(account.averages, 'average')} ({account.effective_averages:.1f} effective) of "
         f"{account.segment_s:.6g} s, window {account.window}, lines {number(spacing_hz)} Hz apart",
         ["channel", "RMS", "unit", "highest peak [Hz]", "density there", "unit"],
         [

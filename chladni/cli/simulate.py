@@ -11,6 +11,7 @@ from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.settings import effect_of, with_settings
 from chladni.cli.words import count, number
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -144,7 +145,7 @@ def _print(to: Output, name: str, made: "SimulatedLog", written: "WrittenLog") -
     series = made.recorded
     to.line(
         f"{name}: {number(series.duration_s, digits=6)} s at {number(series.sample_rate_hz, digits=6)} Hz, "
-        f"{count(series.samples)} samples of {len(series.channels)} channels"
+        f"{count(series.samples)} samples of {counted(len(series.channels), 'channel')}"
     )
     to.table("What the log holds", ["channel", "role", "RMS", "unit"], _rows(series, written.names))
     for score in made.agreement:

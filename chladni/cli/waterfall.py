@@ -6,6 +6,7 @@ from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.words import number, unit
+from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from chladni.signals.waterfall import Waterfall
@@ -62,7 +63,7 @@ def _print_slices(out: Output, found: "Waterfall") -> None:
         rows.append(
             [channel.name, *map(number, numbers), number(float(found.frequency_hz[line])), unit(channel.unit)]
         )
-    apart = f"{found.time_s.size} slices {number(spacing_s)} s apart, lines {number(spacing_hz)} Hz apart"
+    apart = f"{counted(found.time_s.size, 'slice')} {number(spacing_s)} s apart, lines {number(spacing_hz)} Hz apart"
     out.channel_table(
         f"{apart}: RMS of a slice",
         ["channel", "least", "median", "greatest", "at [s]", "strongest line there [Hz]", "unit"],

@@ -15,6 +15,7 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.time_series import Arrays, TimeSeries
 from chladni.signals.value import Value
+from chladni.signals.wording import counted
 
 #: What every verb on samples over time takes.
 SeriesLike = Log | TimeSeries | os.PathLike[str] | Arrays
@@ -103,7 +104,9 @@ def driven_series(
     names = numbered("reference", len(driven))
     drives = TimeSeries.from_arrays(driven, sample_rate_hz=sample_rate_hz, names=names, references=names)
     if drives.samples != moved.samples:
-        raise EstimateError(f"references have {drives.samples} samples, responses {moved.samples}; cut them alike")
+        raise EstimateError(
+            f"references have {counted(drives.samples, 'sample')}, responses {moved.samples}; cut them alike"
+        )
     together = TimeSeries.from_arrays(
         np.vstack([drives.values, moved.values]),
         sample_rate_hz=sample_rate_hz,

@@ -96,12 +96,12 @@ class TimeSeries(Value):
             "values",
             self.values,
             (len(self.channels), self.values.shape[1]),
-            f"{len(self.channels)} channels",
+            f"{counted(len(self.channels), 'channel')}",
         )
         if not abs(self.start_time_ns) + self.duration_s * NS_PER_S < _CENTURIES_NS:
             raise EstimateError(
-                f"{self.samples} samples at {self.sample_rate_hz:g} Hz from {self.start_time_ns} ns on end farther "
-                "from 1970 than nanoseconds of 64 bits count; check the rate and the start"
+                f"{counted(self.samples, 'sample')} at {self.sample_rate_hz:g} Hz from {self.start_time_ns} ns on "
+                "end farther from 1970 than nanoseconds of 64 bits count; check the rate and the start"
             )
         if self.valid is not None:
             require_shape("valid", self.valid, self.values.shape, "the shape of values")

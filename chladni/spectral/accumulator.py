@@ -17,7 +17,7 @@ from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.number_range import LARGEST, largest_magnitudes, require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
-from chladni.signals.wording import rounded_up
+from chladni.signals.wording import counted, rounded_up
 from chladni.spectral.averaging import require_shapes
 from chladni.spectral.blocks import Margins, Numbers, Own
 from chladni.spectral.held_samples import HeldSamples
@@ -362,8 +362,8 @@ class SpectraAccumulator(Generic[SpectraT]):
         if longest >= SHORTEST_SEGMENT:
             remedy = f"ask for {rounded_up(self.sample_rate_hz / longest)} Hz or coarser, or {remedy}"
         return (
-            f"no segment of {samples / self.sample_rate_hz:g} s ({samples} samples) fits between gaps: the longest "
-            f"stretch {where} has {longest} samples; {remedy}"
+            f"no segment of {samples / self.sample_rate_hz:g} s ({counted(samples, 'sample')}) fits between gaps: "
+            f"the longest stretch {where} has {counted(longest, 'sample')}; {remedy}"
         )
 
     def _require_agreement(self, block: TimeSeries) -> None:

@@ -15,6 +15,7 @@ from chladni.signals.levels import BandLevels
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.unit_text import in_unit
+from chladni.signals.wording import counted
 from chladni.spectral.bands import total_rms
 from chladni.spectral.octaves import octaves
 from chladni.spectral.peaks import find_peaks, find_response_peaks
@@ -312,7 +313,7 @@ def _functions(response: FrequencyResponse, answers: Sequence[str], sources: Seq
 def _require_same_lines(before_hz: Real, after_hz: Real) -> None:
     if before_hz.shape == after_hz.shape and np.allclose(before_hz, after_hz, rtol=1e-6, atol=0):
         return
-    described = [f"{hz.size} lines to {hz[-1]:g} Hz" for hz in (before_hz, after_hz)]
+    described = [f"{counted(hz.size, 'line')} to {hz[-1]:g} Hz" for hz in (before_hz, after_hz)]
     raise EstimateError(f"{described[0]} before, {described[1]} after: make both with the same resolution and rate")
 
 

@@ -14,6 +14,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.filtered_series import FilteredSeries
 from chladni.signals.number_range import require_in_range
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import counted
 
 Design = Literal["butterworth", "bessel"]
 Kind = Literal["lowpass", "highpass", "bandpass", "bandstop"]
@@ -197,7 +198,9 @@ def filter_runs(
         )
     lost = int(measured.sum()) - int(valid.sum())
     if lost:
-        notes += (f"{lost} samples in runs shorter than {needed_s:.3g} s were left out: too short for the band",)
+        notes += (
+            f"{counted(lost, 'sample')} in runs shorter than {needed_s:.3g} s left out: too short for the band",
+        )
     # A limit of the sensor is none of what was computed.
     channels = tuple(replace(channel, overload=None) for channel in channels)
     result = replace(series, values=values, channels=channels, valid=None if valid.all() else valid)

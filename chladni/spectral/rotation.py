@@ -9,6 +9,7 @@ from chladni.signals.arrays import Index, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.rotation import Rotation, RotationSource
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.wording import counted
 from chladni.spectral.filters import measured_samples
 from chladni.spectral.waterfall import waterfall
 
@@ -108,8 +109,8 @@ def _from_pulses(series: TimeSeries, pulses_a_revolution: float, threshold: floa
     edges = _rising_edges(values, level, HYSTERESIS * min(high - level, level - low))
     if edges.size < 4:
         raise EstimateError(
-            f"{name}: {edges.size} pulses pass {level:g}; four are needed: give the threshold that they pass, "
-            f"between {low:.4g} and {high:.4g}, or read more"
+            f"{name}: {counted(edges.size, 'pulse')} through {level:g}; four are needed: give the threshold that "
+            f"they pass, between {low:.4g} and {high:.4g}, or read more"
         )
     before, after = values[edges - 1], values[edges]
     when_s = (edges - 1 + (level - before) / (after - before)) / series.sample_rate_hz
@@ -123,7 +124,7 @@ def _from_pulses(series: TimeSeries, pulses_a_revolution: float, threshold: floa
     if lost.size:
         first_s = float(when_s[lost[0]])
         notes.append(
-            f"{name}: {lost.size} times a pulse is missing, first at {first_s:.3f} s; counted by the interval beside"
+            f"{name}: missing {counted(lost.size, 'pulse')}, first at {first_s:.3f} s; counted by the interval beside"
         )
     return Rotation(
         time_s=when_s,

@@ -49,11 +49,11 @@ class Segmentation:
     def __post_init__(self) -> None:
         if self.samples < SHORTEST_SEGMENT:
             raise SetupError(
-                f"a segment of {self.samples} samples is too short; at least {SHORTEST_SEGMENT} are needed, "
-                "so ask for a finer resolution"
+                f"a segment of {counted(self.samples, 'sample')} is too short; at least {SHORTEST_SEGMENT} are "
+                "needed, so ask for a finer resolution"
             )
         if not 1 <= self.hop <= self.samples:
-            raise SetupError(f"hop {self.hop} must be from 1 to the segment's {self.samples} samples")
+            raise SetupError(f"hop {self.hop} must be from 1 to the segment's {counted(self.samples, 'sample')}")
         if self.detrend not in DETRENDS:
             raise SetupError(f"detrend {self.detrend!r} is none of {', '.join(DETRENDS)}")
 

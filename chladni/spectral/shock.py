@@ -16,6 +16,7 @@ from chladni.signals.number_range import require_in_range
 from chladni.signals.shock_response import ShockQuantity, ShockResponse
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.units import integrated
+from chladni.signals.wording import counted
 from chladni.spectral.blocks import leading_part
 from chladni.spectral.filters import channel_runs, measured_samples, require_measured
 
@@ -381,7 +382,7 @@ def _ladder(
         # Slower oscillators see no more of the shock than its change of velocity.
         band_hz = (sample_rate_hz / longest, sample_rate_hz / RATE_OVER_HIGHEST)
         if longest <= RATE_OVER_HIGHEST:
-            raise EstimateError(f"{longest} samples without a gap are too few for a spectrum; read more")
+            raise EstimateError(f"{counted(longest, 'sample')} without a gap: too few for a spectrum; read more")
     low_hz, high_hz = band_hz
     if not 0 < low_hz < high_hz < np.inf:
         raise EstimateError(f"a band from {low_hz:g} to {high_hz:g} Hz holds no natural frequency; give LOW < HIGH")

@@ -14,6 +14,7 @@ from chladni.signals.number_range import LARGEST, require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.waterfall import Waterfall
+from chladni.signals.wording import counted
 from chladni.spectral.accumulator import line_frequencies_hz, one_sided_weights
 from chladni.spectral.blocks import leading_part, samples_known
 from chladni.spectral.held_samples import HeldSamples
@@ -321,7 +322,8 @@ def _grouping_note(slices: _Slices, plan: Segmentation, rate_hz: float) -> tuple
     if slices.group == 1:
         return ()
     note = (
-        f"each slice of the waterfall is the average of {slices.group} segments of {plan.samples / rate_hz:g} s, one "
-        f"every {slices.group * plan.hop / rate_hz:g} s, so that {slices.most} slices hold the log"
+        f"each slice of the waterfall is the average of {counted(slices.group, 'segment')} of "
+        f"{plan.samples / rate_hz:g} s, "
+        f"one every {slices.group * plan.hop / rate_hz:g} s, so that {counted(slices.most, 'slice')} hold the log"
     )
     return (note,)

@@ -13,6 +13,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import require_in_range
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.wording import counted
 from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum, Quantity
 from chladni.spectral.blocks import leading_part
 from chladni.spectral.filters import channel_runs, measured_samples
@@ -110,10 +111,10 @@ def zoom_of_blocks(
             f"a band from {low_hz:g} to {high_hz:g} Hz isn't one within 0 to {run.sample_rate_hz / 2:g} Hz"
         )
     if not 2 <= lines <= MOST_LINES:
-        raise EstimateError(f"{lines} lines; give 2 to {MOST_LINES}")
+        raise EstimateError(f"{counted(lines, 'line')}; give 2 to {MOST_LINES}")
     shape = window_samples(window, min(run.samples, LONGEST_WINDOW))
     if not shape.sum() > 0:
-        raise EstimateError(f"{run.samples} samples without a gap are too few for a spectrum; read more")
+        raise EstimateError(f"{counted(run.samples, 'sample')} without a gap: too few for a spectrum; read more")
     again = whole if isinstance(whole, TimeSeries) else read()
     gain = 2 / (shape.mean() * run.samples) / (1 if quantity == "peak" else np.sqrt(2))
     amplitude = gain * np.abs(_transformed(again, run, shape, band_hz, lines))

@@ -53,8 +53,8 @@ def test_a_place_is_found_from_files(files):
 @pytest.mark.parametrize(
     ("count", "options", "kind", "message"),
     [
-        (1, {}, EstimateError, "1 logs and 3 sensors: a place between sensors takes two levels"),
-        (2, {"sensors": {"a0": "/a0.acc"}}, EstimateError, "2 logs and 1 sensors"),
+        (1, {}, EstimateError, "1 log and 3 sensors: a place between sensors takes two levels"),
+        (2, {"sensors": {"a0": "/a0.acc"}}, EstimateError, "2 logs and 1 sensor:"),
         (2, {"driving_point": "a9"}, EstimateError, "driving point 'a9' is none of the sensors a0, a2, a3"),
         (2, {"force": "/shaker.torque"}, LogError, "/shaker.torque"),
     ],

@@ -64,7 +64,7 @@ def test_people_get_a_table_and_pictures(run, run_up, tmp_path):
         ((), "name exactly one channel that tells the shaft's rotation: --tacho, --phase, --speed, --ridge"),
         (("--tacho", TACHO, "--speed", SPEED), "name exactly one channel"),
         (("--phase", TACHO), "run.mcap: /tacho.volts is in V; an angle must be in rad"),
-        (("--tacho", TACHO, "--threshold", 3), "pulses pass 3; four are needed"),
+        (("--tacho", TACHO, "--threshold", 3), "pulses through 3; four are needed"),
         (("--speed", "/motor.sped"), "/motor.sped"),
         (("--speed", SPEED, "--order", -1), "orders -1: give different ones above 0"),
         (("--speed", SPEED, "--revolutions", 1e5), "the shaft turns 800 times without a break"),

@@ -174,7 +174,7 @@ def test_what_has_no_spectrum_is_refused(options, words):
 def test_a_series_of_nothing_or_of_little_is_refused():
     with pytest.raises(EstimateError, match="holds no channel"):
         srs(series(np.zeros((1, 100)), rate_hz=RATE_HZ).select([]))
-    with pytest.raises(EstimateError, match="3 samples without a gap are too few"):
+    with pytest.raises(EstimateError, match="3 samples without a gap: too few"):
         srs(series(np.zeros(3), rate_hz=RATE_HZ))
 
 

@@ -26,6 +26,7 @@ from chladni.signals.channel import Channel, Role, Vector
 from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.unit_labels import read_label
+from chladni.signals.wording import counted
 
 SERIES_FORMAT = "chladni.series/1"
 
@@ -113,7 +114,7 @@ def _channels(fields: Mapping[str, Any], names: list[str], where: str) -> tuple[
     directions = _rows(fields, "directions", 3, where).T if count else np.empty((0, 3))
     overloads = _rows(fields, "overloads", count, where)[:, 0] if count else np.empty(0)
     if len(directions) != count:
-        raise LogError(f"{where}: directions of {len(directions)} channels, names of {count}")
+        raise LogError(f"{where}: directions of {counted(len(directions), 'channel')}, names of {count}")
     return tuple(
         Channel(
             name=names[row],
@@ -146,7 +147,7 @@ def _texts(fields: Mapping[str, Any], name: str, where: str, count: int | None =
     listed = content if isinstance(content, list) else np.atleast_1d(content).tolist()
     texts = [text if isinstance(text, str) else "" for text in listed]
     if count is not None and len(texts) != count:
-        raise LogError(f"{where}: {len(texts)} {name} for {count} channels")
+        raise LogError(f"{where}: {len(texts)} {name} for {counted(count, 'channel')}")
     return texts
 
 

@@ -129,7 +129,10 @@ def _losses(sound: TimeSeries) -> tuple[str, ...]:
 
 def _names(path: Path, count: int, names: Sequence[str] | None) -> list[str]:
     if names is not None and len(names) != count:
-        raise SetupError(f"{path}: has {count} channels, but {len(names)} names were given; name each channel")
+        raise SetupError(
+            f"{path}: has {counted(count, 'channel')}, but {counted(len(names), 'name')} came with it; name each "
+            "channel"
+        )
     return list(names) if names is not None else [f"ch{number + 1}" for number in range(count)]
 
 
@@ -241,15 +244,15 @@ def _encoding(path: Path, described: bytes, order: str) -> _Encoding:
     letter = {_PCM: "i" if width > 1 else "u", _FLOAT: "f"}.get(kind, "")
     if (letter, width) not in _ENCODINGS or not rate_hz:
         raise LogError(
-            f"{path}: can't be read: encoding {kind} of {frame_bytes} bytes for {channels} channels at {rate_hz} Hz; "
-            "PCM of 8, 16, 24 or 32 bits and floating point of 32 or 64 are read"
+            f"{path}: can't be read: encoding {kind} of {frame_bytes} bytes for {counted(channels, 'channel')} at "
+            f"{rate_hz} Hz; PCM of 8, 16, 24 or 32 bits and floating point of 32 or 64 are read"
         )
     # Bytes a second and a frame are said twice. 24 bits and fewer may lie in four bytes.
     doubts = []
     if second_bytes != rate_hz * frame_bytes:
         doubts.append(f"{rate_hz} Hz of {frame_bytes} bytes a frame aren't {second_bytes} bytes a second")
     if -(-bits // 8) not in (width, 3 if width == 4 else width):
-        doubts.append(f"{channels} channels of {bits} bits aren't {frame_bytes} bytes a frame")
+        doubts.append(f"{counted(channels, 'channel')} of {bits} bits aren't {frame_bytes} bytes a frame")
     told = "times and samples may be wrong: compare them with what was recorded, or record it again"
     doubt = f"contradicts itself: {' and '.join(doubts)}; {told}" if doubts else ""
     return _Encoding(rate_hz=rate_hz, channels=channels, order=order, letter=letter, width=width, doubt=doubt)

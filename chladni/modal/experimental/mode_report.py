@@ -21,6 +21,7 @@ from chladni.signals.modal_fit import ModalFit
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.order_spread import OrderSpread
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
+from chladni.signals.wording import counted
 
 ESTIMATOR = "pLSCF"
 # Chi-square above which the modes don't explain the functions within their scatter.
@@ -196,7 +197,9 @@ class ModeReport:
 def _shortfall(count: int | None, found: int) -> tuple[str, ...]:
     if count is None or found >= count:
         return ()
-    return (f"{count} modes were asked for, but the data need no more than {found}: more would only follow noise",)
+    return (
+        f"{counted(count, 'mode')} asked for, but the data need no more than {found}: more would only follow noise",
+    )
 
 
 def complex_mode_indicator(response: FrequencyResponse) -> Real:

@@ -9,6 +9,7 @@ from chladni.modal.operational.response_shapes import ResponseShape, largest_one
 from chladni.modal.operational.spectral_decomposition import SpectralDecomposition
 from chladni.signals.machine_harmonic import MachineHarmonic
 from chladni.signals.mode_set import ModeSet
+from chladni.signals.wording import counted
 
 UNSCALED = "shapes are unscaled: responses alone don't tell the modal mass"
 ONE_CHANNEL = (
@@ -46,8 +47,9 @@ def response_mode_set(
     # The first singular value stands all the same: only what lies below it is lost.
     if decomposition.averages < len(decomposition.channels):
         remarks.append(
-            f"{decomposition.averages:.3g} effective averages of {len(decomposition.channels)} channels leave the "
-            "spectral matrix singular, and its small singular values without meaning; a coarser resolution helps"
+            f"{decomposition.averages:.3g} effective averages of {counted(len(decomposition.channels), 'channel')} "
+            "leave the spectral matrix singular, and its small singular values without meaning; a coarser resolution "
+            "helps"
         )
     return ModeSet(
         frequency_hz=np.array([mode.frequency_hz for mode in ordered], dtype=np.float64),

@@ -12,6 +12,7 @@ from chladni.modal.poles.pole_selection import PoleSelection, SelectionRules, se
 from chladni.modal.poles.pole_table import PoleTable
 from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.machine_harmonic import MachineHarmonic
+from chladni.signals.wording import counted
 
 # Relative standard deviations between which the replication asked for rises. Poles of white noise have 0.4 with two
 # channels, of which half may come back, and 0.15 with ten, of which less than a sixth does.
@@ -188,7 +189,7 @@ def _kept(
 def _shortfall(count: int, found: int) -> tuple[str, ...]:
     if found >= count:
         return ()
-    return (f"{count} modes were asked for, but the record holds no more than {found} that are sure",)
+    return (f"{counted(count, 'mode')} asked for, but the record holds no more than {found} that are sure",)
 
 
 def _repeated(table: PoleTable, rows: Whole, clusters: Sequence[Whole], rules: ResponseRules) -> Mask:

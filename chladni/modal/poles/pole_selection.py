@@ -11,6 +11,7 @@ from chladni.signals.arrays import Complex, Real, Whole
 from chladni.signals.errors import SetupError
 from chladni.signals.order_spread import OrderSpread
 from chladni.signals.value import Value, require_shape
+from chladni.signals.wording import counted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -253,7 +254,7 @@ def _strongest(table: PoleTable, clusters: list[Whole], count: int) -> list[Whol
 def _shortfall(count: int, found: int) -> tuple[str, ...]:
     if found >= count:
         return ()
-    return (f"{count} modes were asked for, but the poles of no more than {found} agree over the model orders",)
+    return (f"{counted(count, 'mode')} asked for, but the poles of no more than {found} agree over the model orders",)
 
 
 def _nearest(

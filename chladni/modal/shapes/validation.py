@@ -99,8 +99,8 @@ def _few_sensors(modes: ModeSet) -> list[str]:
     if sensors >= found:
         return []
     sentence = (
-        f"{counted(sensors, 'channel')} for {found} modes: shapes of so few components can't be independent of each "
-        "other; give at least as many sensors as modes, spread over the structure."
+        f"{counted(sensors, 'channel')} for {counted(found, 'mode')}: shapes of so few components can't be "
+        "independent of each other; give at least as many sensors as modes, spread over the structure."
     )
     return [sentence]
 

@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 from chladni.signals.peak import Peak
 from chladni.signals.study import Study
 from chladni.signals.visible import visible
-from chladni.signals.wording import with_sigma
+from chladni.signals.wording import counted, with_sigma
 from chladni.viewers.labels import printed_unit
 from chladni.viewers.mode_tables import Row, mode_table
 from chladni.viewers.style import Style
@@ -89,7 +89,7 @@ def _method(study: Study) -> Iterator[str]:
     for account in accounts:
         yield (
             f"- {escaped(account.estimator)}: window {escaped(account.window)}, segments of {account.segment_s:g} s,"
-            f" overlap {account.overlap:.0%}, {account.averages} averages"
-            f" ({account.effective_averages:.3g} effective), {account.skipped} segments left out"
+            f" overlap {account.overlap:.0%}, {counted(account.averages, 'average')}"
+            f" ({account.effective_averages:.3g} effective), {counted(account.skipped, 'segment')} left out"
         )
         yield from (f"  - {escaped(note)}" for note in account.notes)

@@ -115,7 +115,7 @@ def test_damaged_files_are_told_in_one_line(tmp_path: Path, damage: object, matc
 
 @pytest.mark.parametrize(
     ("options", "match"),
-    [({"names": ["a", "b"]}, "has 1 channels, but 2 names"), ({"units": {"ch2": "N"}}, "no channel 'ch2'")],
+    [({"names": ["a", "b"]}, "has 1 channel, but 2 names"), ({"units": {"ch2": "N"}}, "no channel 'ch2'")],
 )
 def test_names_and_units_must_fit(tmp_path: Path, options: dict[str, object], match: str) -> None:
     written_pcm(tmp_path / "a.wav", 2, [1, 2, 3])

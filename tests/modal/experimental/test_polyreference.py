@@ -163,7 +163,7 @@ def test_fewer_modes_than_there_are_are_the_most_significant():
 def test_more_modes_than_there_are_get_fewer_with_the_reason():
     modes = IDENTIFY(line_response(2), count=9)
     assert modes.frequency_hz.size == 5
-    assert any("9 modes were asked for, but the data need no more than 5" in n for n in modes.provenance.notes)
+    assert any("9 modes asked for, but the data need no more than 5" in n for n in modes.provenance.notes)
 
 
 def test_frequencies_asked_for():

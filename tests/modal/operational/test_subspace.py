@@ -175,9 +175,7 @@ def test_a_count_keeps_the_strongest_and_says_what_is_missing():
     assert few.frequency_hz.size == 2
     many = identify(chain_record(0, cycles=600), count=9)
     assert many.frequency_hz.size == 5
-    assert any(
-        "9 modes were asked for, but the record holds no more than 5" in note for note in many.provenance.notes
-    )
+    assert any("9 modes asked for, but the record holds no more than 5" in note for note in many.provenance.notes)
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2))])

@@ -65,7 +65,7 @@ def test_an_empty_table_has_no_modes():
     chosen = select_poles(empty_table(), count=2)
     assert chosen.pole.size == 0
     assert chosen.vector.shape == (0, 2)
-    assert "2 modes were asked for" in chosen.notes[0]
+    assert "2 modes asked for" in chosen.notes[0]
     assert "no pole within" in select_poles(empty_table(), frequencies_hz=[3.0]).notes[0]
 
 
@@ -107,7 +107,7 @@ def test_fewer_than_there_are_takes_those_that_most_orders_hold():
 def test_more_than_there_are_gives_those_there_are_with_a_reason():
     chosen = select_poles(made_table(THREE), count=5)
     assert chosen.pole.size == 3
-    assert chosen.notes == ("5 modes were asked for, but the poles of no more than 3 agree over the model orders",)
+    assert chosen.notes == ("5 modes asked for, but the poles of no more than 3 agree over the model orders",)
 
 
 def test_frequencies_asked_for():
