@@ -57,7 +57,7 @@ def test_the_longest_run_without_a_gap_is_taken():
     [
         ({"band_hz": (20.0, 10.0)}, "isn't one within 0 to 500 Hz"),
         ({"band_hz": (10.0, 501.0)}, "isn't one within"),
-        ({"band_hz": (10.0, 20.0), "lines": 1}, "1 lines; give 2 to"),
+        ({"band_hz": (10.0, 20.0), "lines": 1}, "1 line; give 2 to"),
     ],
 )
 def test_what_is_no_band_is_refused(options, words):

@@ -129,7 +129,7 @@ def select_poles(
     >>> table = PoleTable(orders=orders, order=orders, pole=pole, vector=np.ones((10, 1), complex))
     >>> chosen = select_poles(table, count=2)
     >>> chosen.spread.frequency_hz.round(2), chosen.notes
-    (array([10.]), ('2 modes were asked for, but the poles of no more than 1 agree over the model orders',))
+    (array([10.]), ('2 modes asked for, but the poles of no more than 1 agree over the model orders',))
     """
     rules = rules or SelectionRules()
     require_request(count, frequencies_hz, band_hz)
