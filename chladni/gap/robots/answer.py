@@ -29,7 +29,7 @@ from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forward import Confirmed, confirmed, machine_of
 from chladni.gap.robots.next_measurement import next_measurement
 from chladni.gap.robots.pictures import joint_motion, torque_maps, torque_signals
-from chladni.gap.robots.pushes import PUSHED, Push
+from chladni.gap.robots.pushes import Push
 from chladni.gap.robots.remarks import remarks_on
 from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.solved import Solved
@@ -174,7 +174,7 @@ class Answer:
             model=solved.torques.robot.name,
             logs=(solved.torques.log.log,),
             verdict=self.verdict,
-            causes=tuple(one.cause for one in self.named) or tuple(map(_pushing, self.solved.pushes)),
+            causes=tuple(one.cause for one in self.named) or tuple(one.cause for one in self.solved.pushes),
             ranking=tuple(_ranking(self.weighed)),
             where=_where(solved, self._contest.nothing),
             left=_where(solved, self._best) if self.verdict == "unknown" else None,
@@ -243,22 +243,6 @@ class Weighed:
             variant=self.term.variant if self.term.word == "encoder_offset" else None,
             share=self.share,
         )
-
-
-def _pushing(one: Push) -> Cause:
-    """Tell of what pushed as the part of ``unknown`` that has a place and a time."""
-    return Cause(
-        effect=PUSHED,
-        site=one.links[0],
-        probability=one.probability,
-        group=one.links,
-        alternatives=tuple(dict.fromkeys(Candidate(effect=law.word, site=law.site) for law in one.others)),
-        parameters={
-            "start": FittedNumber(value=one.start_s, std=one.spread_s, unit="s"),
-            "end": FittedNumber(value=one.end_s, std=one.spread_s, unit="s"),
-            "torque": FittedNumber(value=one.torque, std=one.spread, unit=one.unit),
-        },
-    )
 
 
 def _weighed(solved: Solved, place: int) -> Weighed:

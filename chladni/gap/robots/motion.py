@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -78,9 +78,17 @@ class Motion:
     @cached_property
     def kept(self) -> Index:
         """Samples of the coarse grid."""
-        rate = self.log.sample_rate_hz
-        ends = round(_ENDS / self.cutoff_hz * rate)
-        return np.concatenate([np.arange(a + ends, b - ends, self._stride) for a, b in self.stretches])
+        return np.concatenate(self._kept)
+
+    @property
+    def begins(self) -> tuple[int, ...]:
+        """Where on the coarse grid stretches begin."""
+        return tuple(accumulate((one.size for one in self._kept[:-1]), initial=0))
+
+    @cached_property
+    def _kept(self) -> list[Index]:
+        ends = round(_ENDS / self.cutoff_hz * self.log.sample_rate_hz)
+        return [np.arange(a + ends, b - ends, self._stride) for a, b in self.stretches]
 
     def at_s(self, grid_s: ArrayLike) -> Real:
         """Give the log's time of times on the coarse grid, whose samples follow one another without a break."""

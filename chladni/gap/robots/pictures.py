@@ -41,7 +41,6 @@ def torque_signals(torques: Torques, explained: Real) -> GapSignals:
     lines = drive.shape[1] // 2 + 1
     seconds = torques.log.time_s[torques.kept]
     time_s, frequency_hz, density = gap_map(torques.whole(torques.missing), drive, rate)
-    starts = np.flatnonzero(np.diff(seconds) * rate > _GAP) + 1
     return GapSignals(
         log=torques.log.log,
         sample_rate_hz=rate,
@@ -56,7 +55,7 @@ def torque_signals(torques: Torques, explained: Real) -> GapSignals:
         map_frequency_hz=frequency_hz,
         gap_map=density,
         gap_map_after=gap_map(drive - after, drive, rate)[2],
-        window_starts=(0, *starts.tolist()) if starts.size else (),
+        window_starts=torques.begins if len(torques.begins) > 1 else (),
         time_s=seconds,
     )
 

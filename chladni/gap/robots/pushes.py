@@ -8,6 +8,7 @@ from scipy.ndimage import label, uniform_filter1d
 from scipy.special import chdtri, expit
 
 from chladni.gap.calibration import ANOTHER, CLOSE, DETAILS, DOUBTED, FAR, LAPSE, LITTLE, MOST, QUARTER, TEMPER
+from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import RIGHT, Torques
@@ -16,9 +17,6 @@ from chladni.signals.arrays import Mask, Real
 
 #: Periods of the cutoff over which energy is looked at: what a filter of its length can tell apart.
 _WINDOW = 2.0
-
-#: Samples that lie farther apart than so many intervals are of two stretches.
-_GAP = 1.5
 
 #: Word of what pushes: a named part of ``unknown``.
 PUSHED = "external_force"
@@ -59,16 +57,32 @@ class Push:
     probability: float
     others: tuple[Term, ...]
 
+    @property
+    def cause(self) -> Cause:
+        """The record: the part of ``unknown`` that has a place and a time."""
+        return Cause(
+            effect=PUSHED,
+            site=self.links[0],
+            probability=self.probability,
+            group=self.links,
+            alternatives=tuple(dict.fromkeys(Candidate(effect=law.word, site=law.site) for law in self.others)),
+            parameters={
+                "start": FittedNumber(value=self.start_s, std=self.spread_s, unit="s"),
+                "end": FittedNumber(value=self.end_s, std=self.spread_s, unit="s"),
+                "torque": FittedNumber(value=self.torque, std=self.spread, unit=self.unit),
+            },
+        )
+
 
 def pushed(contest: Contest, fit: Fit) -> tuple[Stretch, ...]:
     """Give the stretches that hold most of what a fit leaves beyond the noise; none where it's spread."""
     energy, count = contest.course(fit)
     if not count.any():
         return ()
-    times, rate = contest.torques.log.time_s[contest.torques.kept], contest.torques.rate_hz
-    size = max(round(_WINDOW / contest.torques.cutoff_hz * rate), 1)
+    times = contest.torques.log.time_s[contest.torques.kept]
+    size = max(round(_WINDOW / contest.torques.cutoff_hz * contest.torques.rate_hz), 1)
     # Where a log begins, a push is no other than a state that nobody knows: of a motor's spring, of a bristle.
-    for first in (0, *(np.flatnonzero(np.diff(times) * rate > _GAP) + 1).tolist()):
+    for first in contest.torques.begins:
         energy[:, first : first + size] = count[:, first : first + size] = 0.0
     # A push on one joint of many is no smaller than on one of few.
     ratio = np.max(_mean(energy, size) / np.maximum(_mean(count, size), np.mean(count) * LITTLE), axis=0)

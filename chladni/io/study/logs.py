@@ -12,6 +12,7 @@ from threading import Thread
 from typing import Any, BinaryIO, Final
 
 from chladni.io.files.formats import FILE_SUFFIXES, MCAP
+from chladni.io.log_info import some_of
 from chladni.io.regular_file import open_regular
 from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.visible import visible
@@ -109,10 +110,9 @@ def find_logs(words: Sequence[str]) -> tuple[LogAddress, ...]:
 
 def _require_there(words: Sequence[str]) -> None:
     """Refuse slips before any work: the row of a log that never was would stay in the tables."""
-    absent = [visible(word) for word in words if _is_absent(_path(word))]
+    absent = [word for word in words if _is_absent(_path(word))]
     if absent:
-        more = f" and {len(absent) - 3} more" if len(absent) > 3 else ""
-        raise SetupError(f"{', '.join(absent[:3])}{more}: no such file or folder; correct the path or leave it out")
+        raise SetupError(f"{some_of(absent)}: no such file or folder; correct the path or leave it out")
 
 
 def _is_absent(path: Path) -> bool:
