@@ -306,3 +306,13 @@ def test_a_push_is_told_with_its_place_and_time(where, told):
     one = mark("x", truth, answer(verdict="unknown", where=where))
     assert one.told is told
     assert scored([one])["robots"]["push"]["right"] == int(told)
+
+
+@pytest.mark.parametrize(("group", "told"), [(["arm", "hand"], True), (["arm"], False)])
+def test_a_push_is_told_by_a_force_on_any_link_of_its_group(group, told):
+    truth = {"kind": "outside", "ratio": 9.0, "effects": [
+        {"effect": "push", "site": "hand", "parameters": {"start": 3.0, "end": 3.5}, "also": []}
+    ]}  # fmt: skip
+    said = answer(("external_force", "arm", {"start": {"value": 2.9}, "end": {"value": 3.6}}), verdict="unknown")
+    said["causes"][0]["group"] = group
+    assert mark("x", truth, said).told is told
