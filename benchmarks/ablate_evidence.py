@@ -19,10 +19,10 @@ from scipy.stats import binomtest
 
 from chladni.gap import calibration
 from chladni.gap.comparison.measuring import measurement_of
-from chladni.gap.diagnosis.causes import judged, searched
 from chladni.gap.diagnosis.naming import causes_named
 from chladni.gap.diagnosis.search import Search
 from chladni.gap.diagnosis.study import study_of
+from chladni.gap.diagnosis.verdict import judged, searched
 from chladni.io.log import open_log
 from chladni.models.files.model_file import load_model
 from chladni.signals.errors import ChladniError

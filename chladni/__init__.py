@@ -82,7 +82,7 @@ _HOME = {
     "validate": "chladni.modal.shapes.validation",
     "Damper": "chladni.models.analysis.damper_placement",
     "place_damper": "chladni.models.analysis.damper_placement",
-    "influence": "chladni.models.analysis.influence",
+    "influence": "chladni.models.analysis.influence_coefficients",
     "optimise": "chladni.models.analysis.optimise",
     "Wish": "chladni.models.analysis.wish",
     "Model": "chladni.models.core.model",
@@ -174,16 +174,16 @@ _HOME = {
     "partial_coherence": "chladni.spectral.coherence",
     "cross_spectra": "chladni.spectral.cross_spectra",
     "deflection_shapes": "chladni.spectral.deflection",
-    "cross_correlation": "chladni.spectral.delay",
-    "time_delay": "chladni.spectral.delay",
+    "cross_correlation": "chladni.spectral.time_delay",
+    "time_delay": "chladni.spectral.time_delay",
     "envelope": "chladni.spectral.envelope",
     "bandpass": "chladni.spectral.filters",
     "bandstop": "chladni.spectral.filters",
     "highpass": "chladni.spectral.filters",
     "lowpass": "chladni.spectral.filters",
     "convert_form": "chladni.spectral.forms",
-    "find_impacts": "chladni.spectral.impact",
-    "impact_cross_spectra": "chladni.spectral.impact",
+    "find_impacts": "chladni.spectral.impact_test",
+    "impact_cross_spectra": "chladni.spectral.impact_test",
     "differentiate": "chladni.spectral.integration",
     "differentiate_density": "chladni.spectral.integration",
     "integrate": "chladni.spectral.integration",
@@ -191,8 +191,8 @@ _HOME = {
     "kurtogram": "chladni.spectral.kurtogram",
     "levels": "chladni.spectral.levels",
     "octaves": "chladni.spectral.octaves",
-    "order_cuts": "chladni.spectral.orders",
-    "order_map": "chladni.spectral.orders",
+    "order_cuts": "chladni.spectral.order_tracking",
+    "order_map": "chladni.spectral.order_tracking",
     "find_peaks": "chladni.spectral.peaks",
     "find_response_peaks": "chladni.spectral.peaks",
     "check_profile": "chladni.spectral.random_vibration",
@@ -201,7 +201,7 @@ _HOME = {
     "vibration_response": "chladni.spectral.random_vibration",
     "rotation": "chladni.spectral.rotation",
     "severity": "chladni.spectral.severity",
-    "srs": "chladni.spectral.shock",
+    "srs": "chladni.spectral.shock_response",
     "check_sine": "chladni.spectral.sine_vibration",
     "sine_limits": "chladni.spectral.sine_vibration",
     "sine_profile": "chladni.spectral.sine_vibration",
@@ -289,7 +289,7 @@ if TYPE_CHECKING:
     from chladni.modal.shapes.validation import validate as validate
     from chladni.models.analysis.damper_placement import Damper as Damper
     from chladni.models.analysis.damper_placement import place_damper as place_damper
-    from chladni.models.analysis.influence import influence as influence
+    from chladni.models.analysis.influence_coefficients import influence as influence
     from chladni.models.analysis.optimise import optimise as optimise
     from chladni.models.analysis.wish import Wish as Wish
     from chladni.models.core.model import Model as Model
@@ -381,16 +381,14 @@ if TYPE_CHECKING:
     from chladni.spectral.coherence import partial_coherence as partial_coherence
     from chladni.spectral.cross_spectra import cross_spectra as cross_spectra
     from chladni.spectral.deflection import deflection_shapes as deflection_shapes
-    from chladni.spectral.delay import cross_correlation as cross_correlation
-    from chladni.spectral.delay import time_delay as time_delay
     from chladni.spectral.envelope import envelope as envelope
     from chladni.spectral.filters import bandpass as bandpass
     from chladni.spectral.filters import bandstop as bandstop
     from chladni.spectral.filters import highpass as highpass
     from chladni.spectral.filters import lowpass as lowpass
     from chladni.spectral.forms import convert_form as convert_form
-    from chladni.spectral.impact import find_impacts as find_impacts
-    from chladni.spectral.impact import impact_cross_spectra as impact_cross_spectra
+    from chladni.spectral.impact_test import find_impacts as find_impacts
+    from chladni.spectral.impact_test import impact_cross_spectra as impact_cross_spectra
     from chladni.spectral.integration import differentiate as differentiate
     from chladni.spectral.integration import differentiate_density as differentiate_density
     from chladni.spectral.integration import integrate as integrate
@@ -398,8 +396,8 @@ if TYPE_CHECKING:
     from chladni.spectral.kurtogram import kurtogram as kurtogram
     from chladni.spectral.levels import levels as levels
     from chladni.spectral.octaves import octaves as octaves
-    from chladni.spectral.orders import order_cuts as order_cuts
-    from chladni.spectral.orders import order_map as order_map
+    from chladni.spectral.order_tracking import order_cuts as order_cuts
+    from chladni.spectral.order_tracking import order_map as order_map
     from chladni.spectral.peaks import find_peaks as find_peaks
     from chladni.spectral.peaks import find_response_peaks as find_response_peaks
     from chladni.spectral.random_vibration import check_profile as check_profile
@@ -408,10 +406,12 @@ if TYPE_CHECKING:
     from chladni.spectral.random_vibration import vibration_response as vibration_response
     from chladni.spectral.rotation import rotation as rotation
     from chladni.spectral.severity import severity as severity
-    from chladni.spectral.shock import srs as srs
+    from chladni.spectral.shock_response import srs as srs
     from chladni.spectral.sine_vibration import check_sine as check_sine
     from chladni.spectral.sine_vibration import sine_limits as sine_limits
     from chladni.spectral.sine_vibration import sine_profile as sine_profile
+    from chladni.spectral.time_delay import cross_correlation as cross_correlation
+    from chladni.spectral.time_delay import time_delay as time_delay
     from chladni.spectral.transmissibility import transmissibility as transmissibility
     from chladni.spectral.transmissibility import transmissibility_along as transmissibility_along
     from chladni.spectral.waterfall import waterfall as waterfall

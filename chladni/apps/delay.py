@@ -11,7 +11,7 @@ from chladni.io.log import Log
 from chladni.signals.cross_correlation import TimeDelays
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
-from chladni.spectral.delay import time_delay
+from chladni.spectral.time_delay import time_delay
 
 
 def log_delays(

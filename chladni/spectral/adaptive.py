@@ -16,7 +16,13 @@ from chladni.signals.time_series import TimeSeries
 from chladni.spectral.accumulator import AutoSpectraAccumulator, require_finite
 from chladni.spectral.blocks import Source, leading_part
 from chladni.spectral.cross_spectra import cross_spectra, segment_average
-from chladni.spectral.impact import Impacts, find_impacts, impact_auto_spectra, impact_cross_spectra, is_impact_test
+from chladni.spectral.impact_test import (
+    Impacts,
+    find_impacts,
+    impact_auto_spectra,
+    impact_cross_spectra,
+    is_impact_test,
+)
 from chladni.spectral.period import Period, first_period
 from chladni.spectral.periodic import periodic_auto_spectra, periodic_cross_spectra
 from chladni.spectral.products import SpectraT

@@ -6,7 +6,7 @@ import numpy as np
 
 from chladni.gap.calibration import LAPSE, TEMPER
 from chladni.gap.diagnosis.belief import Belief
-from chladni.gap.diagnosis.causes import Causes
+from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.evidence import Left
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.records.diagnosis import Verdict

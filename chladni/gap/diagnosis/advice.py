@@ -6,8 +6,8 @@ from chladni.gap.calibration import ALONE, CLOSE, FORMS, PLACES, SOME
 from chladni.gap.comparison.scale_doubt import scale_doubt
 from chladni.gap.design.next_measurement import next_measurement
 from chladni.gap.design.what_is_missing import level_missing, sensor_missing, what_is_missing
-from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
+from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.driven_part import driven_parts
 from chladni.signals.errors import ModelError

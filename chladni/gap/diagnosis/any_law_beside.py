@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from chladni.gap.calibration import ALONE
-from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
+from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.any_law import left_by_any_law
 from chladni.gap.location.locate import Located, explained_share
 from chladni.gap.plant.places import Site

@@ -12,7 +12,6 @@ from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, re
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.diagnosis.advice import advice_on, measure_next
 from chladni.gap.diagnosis.any_law_beside import any_law
-from chladni.gap.diagnosis.causes import Causes, causes_found
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.correlation import correlation_of
 from chladni.gap.diagnosis.evidence import evidence
@@ -22,6 +21,7 @@ from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tun
 from chladni.gap.diagnosis.other_logs import tried_elsewhere
 from chladni.gap.diagnosis.remarks import remarks_on
 from chladni.gap.diagnosis.study import Study, study_of
+from chladni.gap.diagnosis.verdict import Causes, causes_found
 from chladni.gap.location.locate import Located, Location, explained_share
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.plant.places import Site

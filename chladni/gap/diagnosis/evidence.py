@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
+from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.location.profile import profile_at
 from chladni.gap.location.recovered import Recovered, recovered
 from chladni.gap.plant.places import Place, Site

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import explained_power
+from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.records.diagnosis import Candidate, Cause, Closing
 
 

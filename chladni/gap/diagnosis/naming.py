@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from chladni.gap.calibration import CLOSE, NAMED, UNWEIGHED
-from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study
+from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber, Ranked
 from chladni.gap.tuning.output_error import OutputErrorFit

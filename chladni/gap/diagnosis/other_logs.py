@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from chladni.gap.comparison.periodicity import with_period
-from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.study import Study, floor_of, training_of
+from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.windows import short_windows

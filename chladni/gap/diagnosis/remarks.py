@@ -9,8 +9,8 @@ from chladni.gap.comparison.distortion import Distortion
 from chladni.gap.comparison.outside_band import products_outside
 from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.comparison.unstable_model import instability_found
-from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.study import Study, step_error
+from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.black_box import BlackBox
 from chladni.gap.records.measurement import Measurement

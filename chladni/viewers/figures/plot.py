@@ -51,7 +51,7 @@ from chladni.viewers.figures import (
     octaves,
     orders,
     random_vibration,
-    shock,
+    shock_response,
     sine_vibration,
     waterfall,
 )
@@ -283,8 +283,8 @@ def _(value: FilteredSeries) -> list[Picture]:
 @pictures.register
 def _(value: ShockResponse) -> list[Picture]:
     style = Style.of_channels(value.channels)
-    draw = partial(shock.draw_shock, response=value, style=style)
-    return _of_groups(value.channels, shock.HEIGHT_IN, draw, shock.X_LABEL)
+    draw = partial(shock_response.draw_shock, response=value, style=style)
+    return _of_groups(value.channels, shock_response.HEIGHT_IN, draw, shock_response.X_LABEL)
 
 
 @pictures.register

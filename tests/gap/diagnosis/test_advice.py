@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from chladni.gap.diagnosis.advice import measure_next
 from chladni.gap.diagnosis.belief import Belief
-from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.diagnosis.study import Study, study_of
+from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.records.diagnosis import Verdict

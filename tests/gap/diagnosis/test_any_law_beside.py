@@ -6,9 +6,9 @@ import pytest
 
 import chladni
 from chladni.gap.diagnosis.any_law_beside import any_law
-from chladni.gap.diagnosis.causes import Causes, causes_found
 from chladni.gap.diagnosis.naming import causes_named
 from chladni.gap.diagnosis.study import Study, study_of
+from chladni.gap.diagnosis.verdict import Causes, causes_found
 from chladni.gap.records.diagnosis import AnyLaw
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.catalogue import CATALOGUE

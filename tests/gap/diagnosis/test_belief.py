@@ -9,8 +9,8 @@ import pytest
 
 from chladni.gap.calibration import ANOTHER, WORTH
 from chladni.gap.diagnosis.belief import Belief
-from chladni.gap.diagnosis.causes import _verdict
 from chladni.gap.diagnosis.search import Search
+from chladni.gap.diagnosis.verdict import _verdict
 from chladni.gap.explanation.evidence import Left
 from chladni.gap.plant.places import Place, Site
 from chladni.gap.records.diagnosis import PARAMETER, Candidate

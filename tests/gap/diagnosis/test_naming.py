@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from chladni.gap.diagnosis.causes import Causes
 from chladni.gap.diagnosis.naming import causes_named, ranking_of
+from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.diagnosis import PARAMETER
 from chladni.models.effects.attached_effect import attached

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from chladni.gap.diagnosis.causes import causes_found
 from chladni.gap.diagnosis.other_logs import tried_elsewhere
 from chladni.gap.diagnosis.study import study_of
+from chladni.gap.diagnosis.verdict import causes_found
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.structures.structure_output import StructureOutput

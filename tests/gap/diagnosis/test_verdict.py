@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import pytest
 
-from chladni.gap.diagnosis.causes import causes_found
 from chladni.gap.diagnosis.naming import causes_named
 from chladni.gap.diagnosis.study import study_of
+from chladni.gap.diagnosis.verdict import causes_found
 from chladni.gap.records.diagnosis import Candidate
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.catalogue import CATALOGUE

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import correlate
 
 from chladni.signals.errors import EstimateError
-from chladni.spectral.delay import cross_correlation, time_delay
+from chladni.spectral.time_delay import cross_correlation, time_delay
 from tests.spectral.made_signals import noise, series
 
 RATE_HZ = 1000.0
