@@ -182,8 +182,8 @@ _HOME = {
     "highpass": "chladni.spectral.filters",
     "lowpass": "chladni.spectral.filters",
     "convert_form": "chladni.spectral.forms",
-    "find_impacts": "chladni.spectral.impact_test",
-    "impact_cross_spectra": "chladni.spectral.impact_test",
+    "find_impacts": "chladni.spectral.impact_testing",
+    "impact_cross_spectra": "chladni.spectral.impact_testing",
     "differentiate": "chladni.spectral.integration",
     "differentiate_density": "chladni.spectral.integration",
     "integrate": "chladni.spectral.integration",
@@ -387,8 +387,8 @@ if TYPE_CHECKING:
     from chladni.spectral.filters import highpass as highpass
     from chladni.spectral.filters import lowpass as lowpass
     from chladni.spectral.forms import convert_form as convert_form
-    from chladni.spectral.impact_test import find_impacts as find_impacts
-    from chladni.spectral.impact_test import impact_cross_spectra as impact_cross_spectra
+    from chladni.spectral.impact_testing import find_impacts as find_impacts
+    from chladni.spectral.impact_testing import impact_cross_spectra as impact_cross_spectra
     from chladni.spectral.integration import differentiate as differentiate
     from chladni.spectral.integration import differentiate_density as differentiate_density
     from chladni.spectral.integration import integrate as integrate

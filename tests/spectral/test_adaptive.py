@@ -13,7 +13,7 @@ from chladni.spectral.adaptive import adaptive_auto_spectra, adaptive_cross_spec
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.excitation import excited_lines
 from chladni.spectral.frequency_response import frequency_response
-from chladni.spectral.impact_test import find_impacts, impact_cross_spectra
+from chladni.spectral.impact_testing import find_impacts, impact_cross_spectra
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
 from chladni.spectral.power_spectral_density import power_spectral_density
 from tests.spectral.aircraft import PAYLOAD, SHAKER, aircraft

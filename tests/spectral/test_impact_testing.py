@@ -11,7 +11,7 @@ from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.frequency_response import frequency_response
-from chladni.spectral.impact_test import find_impacts, impact_cross_spectra, is_impact_test
+from chladni.spectral.impact_testing import find_impacts, impact_cross_spectra, is_impact_test
 from chladni.spectral.peaks import find_response_peaks
 from tests.spectral.measured_logs import hammer
 
