@@ -22,7 +22,7 @@ from chladni.signals.study import Study
 from chladni.signals.unit_text import with_unit
 from chladni.signals.wording import with_sigma
 from chladni.spectral.comparison import compare_densities, compare_responses
-from chladni.viewers.labels import short_names
+from chladni.viewers.style import Style
 
 # As many changes as one reads; tables and documents hold all.
 MOST_TOLD = 25
@@ -61,7 +61,7 @@ class LogComparison:
         if self.response is not None:
             peaks += [one for one in self.response.peaks if one.fate != "unchanged"]
         # As the pictures name them; the document has the names in full.
-        labels = short_names([*(one.channel for one in levels), *(name for one in peaks for name in one.channels)])
+        labels = Style.of(self.after).labels | Style.of(self.before).labels
         told = [*(_level_sentence(one, labels) for one in levels), *(_peak_sentence(one, labels) for one in peaks)]
         more = [f"{len(told) - MOST_TOLD} more changes; all are in the document of --json."] * (len(told) > MOST_TOLD)
         return (*(told[:MOST_TOLD] or ["Nothing changed that scatter doesn't explain."]), *more, *self.notes)

@@ -36,7 +36,7 @@ def grouped_rows(rows: Sequence[Sequence[str]], *, most: int = ROWS_SHOWN_SINGLY
 
 
 def told_once(names: Sequence[str]) -> tuple[str, list[str]]:
-    """Part what all names share from what tells them apart.
+    """Part the folders that all topics share from the rest of the names, which a command takes in their place.
 
     Parameters
     ----------
@@ -46,23 +46,25 @@ def told_once(names: Sequence[str]) -> tuple[str, list[str]]:
     Returns
     -------
     shared : str
-        With ``…`` in the place of what differs; empty where nothing is saved, or all names are the same.
+        With ``…`` in the place of the rest; empty where nothing is saved, or all names are the same.
     rest : list of str
-        What stands there, in their order.
+        Topic's last part and fields, in their order: endings of the names.
 
     Examples
     --------
-    >>> told_once(["/daq.ch1", "/daq.ch2"]), told_once(["/a.x", "/b.y"])
-    (('/daq.…', ['ch1', 'ch2']), ('', ['/a.x', '/b.y']))
+    >>> told_once(["/rig/daq.ch1", "/rig/daq.ch2"]), told_once(["/a.x", "/b.y"])
+    (('/rig/…', ['daq.ch1', 'daq.ch2']), ('', ['/a.x', '/b.y']))
     """
     different = list(dict.fromkeys(names))
     if len(different) < 2:
         return "", list(names)
-    head, tail = _shared_ends(different)
+    # An ending without the topic's last part, such as "linear.x", would be one of other channels, too.
+    head = _common_start(different)
+    head = head[: head.rfind("/") + 1]
     # Where little is saved, parted names are harder to read than whole ones.
-    if len(head) + len(tail) < max(map(len, different)) / 3:
+    if len(head) < max(map(len, different)) / 3:
         return "", list(names)
-    return f"{head}…{tail}", [name[len(head) : len(name) - len(tail)] for name in names]
+    return f"{head}…", [name[len(head) :] for name in names]
 
 
 def braced(names: Sequence[str]) -> str:

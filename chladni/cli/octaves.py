@@ -58,12 +58,12 @@ def octaves(
 
 
 def _print_bands(out: Output, found: "OctaveLevels") -> None:
+    from chladni.signals.channel import labels_of
     from chladni.signals.levels import decibels
     from chladni.spectral.octaves import name_of
     from chladni.viewers.groups import groups
-    from chladni.viewers.labels import short_names
 
-    labels = short_names([channel.name for channel in found.channels])
+    labels = labels_of(found.channels)
     weighted = f", {found.weighting}-weighted" if found.weighting else ""
     in_decibels, totals = found.decibels(), decibels(found.total, found.channels)
     for group in groups(found.channels):

@@ -58,7 +58,7 @@ def _only(role: str) -> Any:
     return typer.Option(
         f"--{role}",
         metavar="NAME",
-        help=f"Only this {role}, by name, unique ending (ch1) or pattern ('*/accel.x'); may be repeated.",
+        help=f"Only this {role}, by name, label, unique ending (ch1) or pattern ('*/accel.x'); may be repeated.",
         show_default=False,
     )
 

@@ -28,6 +28,7 @@ from chladni.io.stamps import (
 from chladni.io.stream import Stream
 from chladni.io.topic import Topic, apart, read_arrivals, read_earlier_heads, read_heads, topics_of
 from chladni.io.topic_channels import TopicChannels, topic_channels
+from chladni.signals.channel import labelled
 from chladni.signals.channel_names import is_pattern, places_of, unknown
 from chladni.signals.errors import EstimateError, LogError, SetupError
 from chladni.signals.wording import near_matches
@@ -99,8 +100,9 @@ class Catalog:
         if known is not None and known.topic not in self.publishers:
             return (known,)
         if not is_pattern(word) and starts_with_topic(word, [*self.topics, *self.refused]):
-            # Said in full: nothing else is meant by it, also where it can't be read.
-            return (self._listed(self.resolve(word)),)
+            # Said in full: nothing else is meant by it, also where it can't be read; unless it's shown as a label.
+            label = next((source for source in self.channels if source.channel.label == word), None)
+            return (self._listed(self.resolve(word)) if label is None else label,)
         try:
             places = places_of(word, list(listed))
         except EstimateError as error:
@@ -238,6 +240,8 @@ def read_catalog(container: Messages, *, setup: Setup, request: StampRequest) ->
     )
     setups = _setups(catalog, setup, listed)
     channels = tuple(with_setup(source, setups.get((source.topic, source.field))) for source in listed)
+    told = labelled(source.channel for source in channels)
+    channels = tuple(replace(source, channel=one) for source, one in zip(channels, told, strict=True))
     return replace(catalog, channels=channels, setups=setups)
 
 

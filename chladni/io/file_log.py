@@ -18,7 +18,7 @@ from chladni.io.loss import Loss, Unread
 from chladni.io.setup import ChannelSetup, Setup, refined
 from chladni.io.shared_grid import SampleGrid
 from chladni.io.stamps import StampRequest
-from chladni.signals.channel import Channel, channel_names
+from chladni.signals.channel import Channel, channel_names, labelled
 from chladni.signals.errors import EstimateError, LogError, SetupError
 from chladni.signals.geometry import Geometry
 from chladni.signals.time_series import NS_PER_S, TimeSeries
@@ -313,7 +313,7 @@ def _all_channels(contents: FileContents) -> list[Channel]:
 
 def _refined(contents: FileContents, setup: Setup) -> FileContents:
     """Refine channels by what the setup file says of them besides their units, and guess excitations before."""
-    contents = replace(contents, series=_with_likely_roles(contents.series))
+    contents = _labelled(replace(contents, series=_with_likely_roles(contents.series)))
     if not setup.channels:
         return contents
     # The reader has brought the numbers to the unit that is stated.
@@ -323,6 +323,21 @@ def _refined(contents: FileContents, setup: Setup) -> FileContents:
         contents,
         series=tuple(_refined_series(part, stated) for part in contents.series),
         functions=None if functions is None else _refined_functions(functions, stated),
+    )
+
+
+def _labelled(contents: FileContents) -> FileContents:
+    """Give all channels of the file the labels that tell them apart."""
+    label = {channel.name: channel.label for channel in labelled(_all_channels(contents))}
+
+    def of(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+        return tuple(replace(channel, label=label[channel.name]) for channel in channels)
+
+    held = contents.functions
+    return replace(
+        contents,
+        series=tuple(part.with_channels(of(part.channels)) for part in contents.series),
+        functions=held and replace(held, responses=of(held.responses), references=of(held.references)),
     )
 
 

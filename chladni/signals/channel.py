@@ -1,10 +1,11 @@
 """A channel: one measured quantity at one place in one direction."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import frexp, inf, isfinite, ldexp, sqrt
 from typing import Final, Literal, Self
 
+from chladni.signals.channel_labels import short_names
 from chladni.signals.channel_names import is_pattern, places_of, require_one, unknown
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.units import si_factor
@@ -52,6 +53,9 @@ class Channel:
         position; empty when anything is possible.
     held
         Whether the quantity is known to keep its value between samples, as a command does.
+    label
+        Short name by which its log's other channels are told from it; empty when nothing is known of a log. It is
+        a way to say the name, and so makes no channel another one.
     """
 
     name: str
@@ -62,10 +66,36 @@ class Channel:
     overload: float | None = None
     units_possible: tuple[str, ...] = ()
     held: bool = False
+    label: str = field(default="", compare=False, repr=False)
 
     def with_name(self, name: str) -> Self:
-        """Give the same channel under another name."""
-        return replace(self, name=name)
+        """Give the same channel under another name; its label stays where only something is put before the name."""
+        return replace(self, name=name, label=self.label if name.endswith(self.name) else "")
+
+
+def labelled(channels: Iterable[Channel]) -> tuple[Channel, ...]:
+    """Give all channels of a log the labels that tell each from all others."""
+    channels = tuple(channels)
+    labels = short_names(channel.name for channel in channels)
+    return tuple(replace(channel, label=labels[channel.name]) for channel in channels)
+
+
+def labels_of(channels: Iterable[Channel]) -> dict[str, str]:
+    """Give labels, all different, of the channels that a table or a picture shows, by their names.
+
+    They are those that the channels have in their log, so that a label that is read anywhere names the channel in
+    any command. What is of no log, or of several that agree in a label, gets the shortest label that tells it apart.
+
+    Examples
+    --------
+    >>> arm = labelled([Channel(name="/imu/arm.accel.x"), Channel(name="/imu/arm.gyro.x")])
+    >>> labels_of(arm[:1]), labels_of([Channel(name="/imu/arm.accel.x")])
+    ({'/imu/arm.accel.x': 'arm.accel.x'}, {'/imu/arm.accel.x': 'arm.x'})
+    """
+    known = {channel.name: channel.label for channel in channels}
+    others = short_names(name for name, label in known.items() if not label)
+    found = {name: label or others[name] for name, label in known.items()}
+    return found if len(set(found.values())) == len(found) else short_names(found)
 
 
 def as_names(names: Names) -> tuple[str, ...]:
@@ -82,7 +112,7 @@ def as_names(names: Names) -> tuple[str, ...]:
 def find_channel(channels: Sequence[Channel], name: str, *, role: str = "channel") -> int:
     """Row of the one channel that a word names, see `places_of`; `EstimateError` when it names none or several."""
     names = [channel.name for channel in channels]
-    return require_one(name, _found(name, names, role), names, role=role)
+    return require_one(name, _found(name, channels, role), names, role=role)
 
 
 def find_channels(channels: Sequence[Channel], names: Names, *, role: str = "channel") -> list[int]:
@@ -95,10 +125,9 @@ def find_channels(channels: Sequence[Channel], names: Names, *, role: str = "cha
     EstimateError
         When a word names none, or an ending several.
     """
-    known = [channel.name for channel in channels]
-    rows = {name: row for row, name in reversed(list(enumerate(known)))}
+    rows = {channel.name: row for row, channel in reversed(list(enumerate(channels)))}
     words = as_names(names)
-    found = [row for word in words for row in ([rows[word]] if word in rows else _found(word, known, role))]
+    found = [row for word in words for row in ([rows[word]] if word in rows else _found(word, channels, role))]
     return list(dict.fromkeys(found)) if any(map(is_pattern, words)) else found
 
 
@@ -107,7 +136,12 @@ def channel_names(channels: Sequence[Channel], names: Names, *, role: str = "cha
     return tuple(channels[row].name for row in find_channels(channels, names, role=role))
 
 
-def _found(word: str, known: Sequence[str], role: str) -> tuple[int, ...]:
+def _found(word: str, channels: Sequence[Channel], role: str) -> tuple[int, ...]:
+    known = [channel.name for channel in channels]
+    labels = [channel.label for channel in channels]
+    # Of several logs' channels some may have one label.
+    if word not in known and word and labels.count(word) == 1:
+        return (labels.index(word),)
     if places := places_of(word, known, role=role):
         return places
     raise EstimateError(unknown(word, known, role=role))

@@ -1,16 +1,15 @@
-"""Which channels a word names: a whole name, the unique ending of one, or a pattern; the one place that decides."""
+"""Which channels a word names: a name, the ending or label of one, or a pattern; the one place that decides."""
 
 import re
 from collections.abc import Sequence
 
+from chladni.signals.channel_labels import BOUNDARY, is_short_for, short_names
 from chladni.signals.errors import EstimateError
 from chladni.signals.visible import place_of, visible
 from chladni.signals.wording import near_matches, near_words
 
 # As many as one reads to find the one that was meant.
 MOST_CANDIDATES = 8
-# Between words stands what is neither a letter nor a digit; an ending may begin with it, too.
-_BOUNDARY = r"(?:^|(?<=[\W_])|(?=[\W_]))"
 
 
 def is_pattern(word: str) -> bool:
@@ -30,8 +29,8 @@ def places_of(word: str, known: Sequence[str], *, role: str = "channel") -> tupl
     Parameters
     ----------
     word
-        A name as it is or as it's shown; else an ending of one name alone, which begins where a word begins; else a
-        pattern of whole names or such endings, which may mean several.
+        A name as it is or as it's shown; else an ending of one name alone, which begins where a word begins; else the
+        label of one, see `short_names`; else a pattern of whole names or such endings, which may mean several.
     known
         Names there are.
     role
@@ -45,23 +44,37 @@ def places_of(word: str, known: Sequence[str], *, role: str = "channel") -> tupl
     Raises
     ------
     EstimateError
-        When several names end so; they're told.
+        When several names end so, or have such a label; they're told.
 
     Examples
     --------
     >>> names = ["/a/imu.accel.x", "/a/imu.accel.y", "/b/wing_rail.x"]
     >>> places_of("rail.x", names), places_of("accel.y", names), places_of("*.x", names), places_of("ail.x", names)
     ((2,), (1,), (0, 2), ())
+    >>> places_of("base.x", ["/imu/base.accel.linear.x", "/imu/wrist.accel.linear.x"])
+    (0,)
     """
     if (place := place_of(word, known)) is not None:
         return (place,)
     told = visible(word)
-    ending = re.compile(_BOUNDARY + (_expression(told) if is_pattern(told) else re.escape(told)) + r"\Z", re.DOTALL)
+    ending = re.compile(BOUNDARY + (_expression(told) if is_pattern(told) else re.escape(told)) + r"\Z", re.DOTALL)
     found = tuple(place for place, name in enumerate(known) if word and ending.search(visible(name)))
-    if len(found) > 1 and not is_pattern(word):
+    if len(found) == 1 or is_pattern(word) or not word:
+        return found
+    labels = short_names(known)
+    if labelled := [place for place, name in enumerate(known) if labels[name] == told]:
+        return tuple(labelled[:1])
+    if found:
         raise EstimateError(
             f"{word!r} is the end of {len(found)} {role}s: {_some([known[place] for place in found])}; "
             f"give more of one name, or '*{word}' for all of them"
+        )
+    # Among fewer channels a shorter label was enough.
+    found = tuple(place for place, name in enumerate(known) if is_short_for(told, name))
+    if len(found) > 1:
+        raise EstimateError(
+            f"{word!r} is short for {len(found)} {role}s: {_some([known[place] for place in found])}; "
+            f"give one as it is listed here"
         )
     return found
 

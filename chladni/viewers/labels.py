@@ -1,14 +1,7 @@
-"""Words on plots: short unambiguous channel names, units as printed, names of quantities."""
-
-import re
-from collections import Counter
-from collections.abc import Iterable, Sequence
+"""Words on plots: units as printed, names of quantities."""
 
 from chladni.signals.errors import SetupError
 from chladni.signals.units import si_factor
-from chladni.signals.visible import visible
-
-LONGEST_NAME = 48
 
 _QUANTITIES = {
     "m/s^2": "Acceleration",
@@ -26,7 +19,6 @@ _QUANTITIES = {
     "K": "Temperature",
     "s": "Time",
 }
-_PIECE = re.compile(r"""(?:\[[^\]]*\]|\{[^}]*\}|"[^"]*"|'[^']*'|[^/.])+|[/.]""")
 
 
 def printed_unit(unit: str) -> str:
@@ -118,70 +110,3 @@ def reduction(slices: int, lines: int) -> str:
     """Say in a plot's title how a waterfall was shortened for drawing; nothing when it wasn't."""
     parts = [f"{count} {what}" for count, what in ((slices, "slices"), (lines, "lines")) if count > 1]
     return f" · greatest of every {' x '.join(parts)}" if parts else ""
-
-
-def short_names(names: Iterable[str]) -> dict[str, str]:
-    """Give every channel name a label as short as it can be without two channels sharing one.
-
-    A label is the last part of the topic and the last field; where that is ambiguous all fields, then the whole
-    name, then the whole name and a number. Characters that can't be seen are shown as escapes.
-
-    Parameters
-    ----------
-    names
-        Channel names; repeated ones count once.
-
-    Returns
-    -------
-    dict
-        Label of each name, all different, at most 48 characters and a number.
-
-    Examples
-    --------
-    >>> list(short_names(["/imu/wrist.accel.linear.x", "/imu/base.accel.linear.x", "/f.force.z"]).values())
-    ['wrist.x', 'base.x', 'f.z']
-    """
-    # In the order given, so that the same log always gets the same labels.
-    pending = list(dict.fromkeys(names))
-    labels: dict[str, str] = {}
-    for shorten in (_leaf, _fields, _whole):
-        candidates = {name: shorten(name) for name in pending}
-        # Labels already given count too: a whole name may be the short form of another.
-        uses = Counter([*candidates.values(), *labels.values()])
-        labels |= {name: label for name, label in candidates.items() if uses[label] == 1}
-        pending = [name for name in pending if name not in labels]
-    for number, name in enumerate(pending, start=2):
-        labels[name] = f"{_whole(name)} #{number}"
-    return labels
-
-
-def _split(name: str) -> tuple[Sequence[str], Sequence[str]]:
-    """Parts of the topic and fields after it; separators inside brackets, braces and quotes don't count."""
-    pieces = _PIECE.findall(name)
-    last_slash = max((place for place, piece in enumerate(pieces) if piece == "/"), default=-1)
-    after = [piece for piece in pieces[last_slash + 1 :] if piece != "."]
-    before = [piece for piece in pieces[: max(last_slash, 0)] if piece not in "/."]
-    return [*before, *after[:1]], after[1:]
-
-
-def _leaf(name: str) -> str:
-    topic, fields = _split(name)
-    return _printable(".".join([*topic[-1:], *fields[-1:]]))
-
-
-def _fields(name: str) -> str:
-    topic, fields = _split(name)
-    return _printable(".".join([*topic[-1:], *fields]))
-
-
-def _whole(name: str) -> str:
-    return _printable(name)
-
-
-def _printable(text: str) -> str:
-    shown = visible(text) or "(no name)"
-    if len(shown) <= LONGEST_NAME:
-        return shown
-    # The end tells channels apart more often than the middle does.
-    half = LONGEST_NAME // 2
-    return f"{shown[: half - 1]}…{shown[-half:]}"

@@ -5,12 +5,12 @@ from collections.abc import Collection, Sequence
 from math import isfinite
 
 from chladni.signals.arrays import Real
+from chladni.signals.channel_labels import LONGEST_NAME
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
 from chladni.signals.relative_motion import RelativeMotion
 from chladni.signals.study import Study
 from chladni.signals.wording import with_sigma
-from chladni.viewers.labels import LONGEST_NAME
 from chladni.viewers.style import Style
 
 Row = tuple[str, ...]

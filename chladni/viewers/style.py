@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chladni.signals.arrays import Bytes, Real
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, labels_of
 from chladni.signals.study import Study
-from chladni.viewers.labels import short_names
 
 Colour = tuple[int, int, int]
 
@@ -88,7 +87,7 @@ class Style:
     @classmethod
     def of(cls, study: Study) -> Self:
         """Give the style of all pictures of `study`."""
-        return cls.of_channels(_channels(study), origin_ns=min(_starts(study), default=0))
+        return cls.of_channels(drawn_channels(study), origin_ns=min(_starts(study), default=0))
 
     @classmethod
     def of_channels(cls, drawn: Iterable[Channel], *, origin_ns: int = 0) -> Self:
@@ -101,7 +100,7 @@ class Style:
         # Units one after another, so that neighbours in a plot of one unit are neighbours in the palette.
         ordered = [name for names in units.values() for name in names]
         return cls(
-            labels=short_names(channels),
+            labels=labels_of(channels.values()),
             numbers={name: place % len(ON_DARK) for place, name in enumerate(ordered)},
             origin_ns=origin_ns,
         )
@@ -122,7 +121,8 @@ def _colours(scale: Real, share: NDArray[np.floating]) -> Bytes:
     return np.stack(parts, axis=-1).astype(np.uint8)
 
 
-def _channels(study: Study) -> Iterator[Channel]:
+def drawn_channels(study: Study) -> Iterator[Channel]:
+    """Give the channels of all results of a study; one of several results comes several times."""
     for series in study.series:
         yield from series.channels
     for density in study.densities:

@@ -11,6 +11,7 @@ from bokeh.document import Document
 from bokeh.models import ColumnDataSource, FactorRange
 from bokeh.plotting import figure
 
+from chladni.signals.channel import labels_of
 from chladni.viewers.bench.errors import told
 from chladni.viewers.bench.latest import Latest
 from chladni.viewers.bench.parts import FILLING, WIDE, button, choice, column, drawing, flow, html, pn, row
@@ -18,7 +19,6 @@ from chladni.viewers.bench.picked import Picked, Picking
 from chladni.viewers.bench.pole_chart import FunctionChart, PoleChart
 from chladni.viewers.bench.theme import Ground, Theme, theme
 from chladni.viewers.bench.words import MESSAGE_CSS, escape, message
-from chladni.viewers.labels import short_names
 from chladni.viewers.mode_tables import mode_table, mode_ticks
 from chladni.viewers.overlays import Overlay, overlay_pages
 from chladni.viewers.style import mac_colours
@@ -145,7 +145,7 @@ class PickingPage:
             return
         pages = overlay_pages(replace(picked.modes, fit=picked.synthesis), picked.response)
         drawn = [(overlay, page.unit) for page in pages for overlay in page.overlays]
-        names = short_names([one.name for one in (*picked.modes.channels, *picked.modes.references)])
+        names = labels_of((*picked.modes.channels, *picked.modes.references))
         drawn.sort(key=lambda one: -one[0].error)
         before = self.function.value
         self._overlays = {

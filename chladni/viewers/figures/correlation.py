@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chladni.signals.channel import labels_of
 from chladni.signals.cross_correlation import CrossCorrelation, TimeDelays
 from chladni.viewers.drawing import thin
 from chladni.viewers.figures.panes import pages
 from chladni.viewers.figures.sheet import look, paint, plain, sheet
-from chladni.viewers.labels import short_names
 from chladni.viewers.style import ON_LIGHT
 
 HEIGHT_IN = 1.3
@@ -32,7 +32,7 @@ def delay_figures(found: TimeDelays) -> dict[str, Figure]:
 
 
 def _figures(found: CrossCorrelation, delay_s: np.ndarray) -> dict[str, Figure]:
-    labels = short_names(channel.name for channel in (found.reference, *found.responses))
+    labels = labels_of((found.reference, *found.responses))
     figures = {}
     with look():
         for page, rows in pages(len(found.responses), A_SHEET):

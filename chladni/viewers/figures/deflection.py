@@ -4,11 +4,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chladni.signals.channel import labels_of
 from chladni.signals.deflection_shapes import DeflectionShapes
 from chladni.viewers.figures.panes import pages
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit, short_names
+from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import ON_LIGHT
 
 HEIGHT_IN = 1.5
@@ -17,7 +18,7 @@ A_SHEET = 5
 
 def deflection_figures(found: DeflectionShapes) -> dict[str, Figure]:
     """Draw the shapes, one pane each, several sheets where there are many; one for each unit's group, by name."""
-    labels = short_names(channel.name for channel in found.channels)
+    labels = labels_of(found.channels)
     figures = {}
     with look():
         for group in groups(found.channels, size=max(len(found.channels), 1)):

@@ -8,12 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chladni.signals.arrays import Real
+from chladni.signals.channel import labels_of
 from chladni.signals.order_spectra import OrderCuts, OrderMap
 from chladni.viewers.drawing import block_maximum, decibels_of_amplitude, phase_wraps, with_breaks
 from chladni.viewers.figures.log_axis import logarithmic
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.figures.waterfall import DYNAMIC_RANGE_DB, MISSING, PIXELS
-from chladni.viewers.labels import decibel_unit, printed_unit, short_names
+from chladni.viewers.labels import decibel_unit, printed_unit
 from chladni.viewers.style import ON_LIGHT
 
 RPM = 60.0
@@ -27,7 +28,7 @@ LEAST_SHARE = 0.01
 
 def order_figures(maps: Sequence[OrderMap], cuts: Sequence[OrderCuts]) -> dict[str, Figure]:
     """Draw for each channel a map, the cuts with their phase, and the Campbell picture; by name."""
-    labels = short_names(channel.name for one in maps for channel in one.channels)
+    labels = labels_of(channel for one in maps for channel in one.channels)
     figures = {}
     with look():
         for one in maps:

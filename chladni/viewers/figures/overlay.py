@@ -1,13 +1,13 @@
 """Spectra and transfer functions of several logs over one another, a curve for each log."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chladni.signals.channel import Channel
+from chladni.signals.channel import Channel, labels_of
 from chladni.signals.study import Study
 from chladni.viewers.figures.density import draw_densities
 from chladni.viewers.figures.frequency_response import (
@@ -20,9 +20,8 @@ from chladni.viewers.figures.frequency_response import (
 from chladni.viewers.figures.log_axis import USUAL, Scales
 from chladni.viewers.figures.sheet import legend, look, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import short_names
 from chladni.viewers.panels import Panel, panels
-from chladni.viewers.style import ON_LIGHT, Style
+from chladni.viewers.style import ON_LIGHT, Style, drawn_channels
 
 # Two plots above one another have the height of one of a single log; more of them become flatter.
 HEIGHT_IN = 2.9
@@ -77,11 +76,16 @@ def _densities(studies: Sequence[Study], scales: Scales) -> dict[str, Figure]:
                     one = Group(name=group.name, unit=group.unit, rows=(row,))
                     style = _style(studies, number, [channel], named=not name)
                     curves.append(partial(draw_densities, density=density, group=one, style=style, scales=scales))
+    labels = _labels(studies)
     return {
-        f"psd {name}{part}": _density_figure(page, scales)
+        f"psd {name}{part}": _density_figure(page, labels, scales)
         for name, channels in drawn.items()
         for part, page in _pages(channels)
     }
+
+
+def _labels(studies: Sequence[Study]) -> dict[str, str]:
+    return labels_of(channel for study in studies for channel in drawn_channels(study))
 
 
 def _single_units(studies: Sequence[Study]) -> set[str]:
@@ -107,17 +111,16 @@ def _pages(channels: dict[str, list[Curve]]) -> Iterator[tuple[str, dict[str, li
         yield f" {number}" if count > 1 else "", {name: channels[name] for name in part}
 
 
-def _density_figure(channels: dict[str, list[Curve]], scales: Scales) -> Figure:
+def _density_figure(channels: dict[str, list[Curve]], labels: Mapping[str, str], scales: Scales) -> Figure:
     height_in = max(HEIGHT_IN / len(channels), FLATTEST_IN)
     figure, stack = sheet([height_in] * len(channels), above_points=LEGEND_POINTS, sharex=True)
-    labels = short_names([name for name in channels if name])
     for axes, (name, curves) in zip(stack, channels.items(), strict=True):
         _draw_over(axes, curves, scales, decade_db=10)
         if name:
             axes.set_title(plain(labels[name]), loc="left", pad=2)
         if axes is not stack[0] and (repeated := axes.get_legend()) is not None:
             repeated.remove()
-    legend(stack[0], above_points=TITLE_POINTS if labels else 0.0)
+    legend(stack[0], above_points=TITLE_POINTS if any(channels) else 0.0)
     _share_label(figure, stack)
     stack[-1].set_xlabel("Frequency [Hz]")
     return figure
@@ -148,14 +151,16 @@ def _responses(studies: Sequence[Study], scales: Scales) -> dict[str, Figure]:
                 )
                 # One function each is meant to be compared, whatever its channels are called.
                 found.setdefault(("", "") if counts == {1} else names, []).append((number, one))
-    labels = short_names([name for names in found for name in names if name])
+    labels = _labels(studies)
     return {
-        f"response {place} {labels.get(names[0], '')}".rstrip(): _response_figure(studies, curves, scales)
+        f"response {place} {labels.get(names[0], '')}".rstrip(): _response_figure(studies, curves, labels, scales)
         for place, (names, curves) in enumerate(found.items(), start=1)
     }
 
 
-def _response_figure(studies: Sequence[Study], panels_: Sequence[tuple[int, Panel]], scales: Scales) -> Figure:
+def _response_figure(
+    studies: Sequence[Study], panels_: Sequence[tuple[int, Panel]], labels: Mapping[str, str], scales: Scales
+) -> Figure:
     coherent = any(is_coherent(panel) for _, panel in panels_)
     figure, stack = sheet(HEIGHTS_IN if coherent else HEIGHTS_IN[:2], above_points=LEGEND_POINTS, sharex=True)
     names = {panel.response.responses[panel.group.rows[0]].name for _, panel in panels_}
@@ -171,7 +176,7 @@ def _response_figure(studies: Sequence[Study], panels_: Sequence[tuple[int, Pane
         for draw in some:
             draw(axes)
     if len(names) == 1:
-        stack[0].set_title(plain(short_names(names)[names.pop()]), loc="left", pad=2)
+        stack[0].set_title(plain(labels[names.pop()]), loc="left", pad=2)
     legend(stack[0], above_points=TITLE_POINTS)
     stack[-1].set_xlabel("Frequency [Hz]")
     return figure
@@ -194,7 +199,7 @@ def _draw_over(axes: Axes, curves: Sequence[Curve], scales: Scales, *, decade_db
 
 def _style(studies: Sequence[Study], number: int, channels: Sequence[Channel], *, named: bool) -> Style:
     """Give the curves of one log its title and its colour; `named` adds the channel."""
-    title, labels = studies[number].title, short_names([channel.name for channel in channels])
+    title, labels = studies[number].title, labels_of(channels)
     # The reference stands in the label of the axis, where its own name belongs.
     first, *others = channels
     words = {first.name: f"{title}: {labels[first.name]}" if named else title}
