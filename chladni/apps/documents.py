@@ -81,11 +81,13 @@ def shock_document(found: Sequence[ShockResponse]) -> Document:
     channels = []
     for response in found:
         own_axis = {} if response is first else {"frequency_hz": plain(response.frequency_hz)}
+        # Worked out of all channels each time it's asked for.
+        maximax = response.maximax
         channels += [
             {
                 "name": channel.name,
                 "unit": channel.unit,
-                "maximax": plain(response.maximax[row]),
+                "maximax": plain(maximax[row]),
                 "positive": plain(response.positive[row]),
                 "negative": plain(response.negative[row]),
                 "offset": finite(float(response.offset[row])),

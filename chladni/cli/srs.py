@@ -77,7 +77,9 @@ def srs(
 
 
 def _print_highest(out: Output, found: "ShockResponse") -> None:
-    lines, rows = found.maximax.argmax(axis=1), range(len(found.channels))
+    # Worked out of all channels each time it's asked for.
+    maximax, rows = found.maximax, range(len(found.channels))
+    lines = maximax.argmax(axis=1)
     low_hz, high_hz = (number(float(found.frequency_hz[end])) for end in (0, -1))
     out.channel_table(
         f"Shock response, {found.quantity.replace('-', ' ')}, Q = {number(found.q)}, from {low_hz} to {high_hz} Hz",
@@ -85,7 +87,7 @@ def _print_highest(out: Output, found: "ShockResponse") -> None:
         [
             [
                 found.channels[row].name,
-                number(float(found.maximax[row, lines[row]])),
+                number(float(maximax[row, lines[row]])),
                 number(float(found.frequency_hz[lines[row]])),
                 number(float(found.positive[row].max())),
                 number(float(found.negative[row].max())),

@@ -4,12 +4,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from math import ceil, floor, log2
-from typing import Any, Literal, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 
 from chladni.io.source import Blocks, SeriesLike, blocks_of, extent_of, is_blocks, log_or_series
-from chladni.signals.arrays import Index, Mask, Real
+from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel, Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.number_range import require_in_range
@@ -19,6 +19,9 @@ from chladni.signals.units import integrated
 from chladni.signals.wording import counted
 from chladni.spectral.blocks import leading_part
 from chladni.spectral.filters import channel_runs, measured_samples, require_measured
+
+if TYPE_CHECKING:
+    from chladni.spectral.oscillator_bank import OscillatorBank
 
 Offset = Literal["first", "median", "keep"]
 
@@ -31,8 +34,6 @@ RATE_OVER_HIGHEST = 10
 # The octaves' own middle (IEC 61260-1), so that spectra of all records have the same lines.
 MIDDLE_HZ = 1000.0
 MOST_LINES = 10_000
-# `scipy.signal.resample_poly` looks so many samples ahead and back.
-RESAMPLING_REACH = 10
 # What oscillators are fed at once: the samples between those are many times as many.
 SAMPLES_AT_ONCE, VALUES_AT_ONCE = 1 << 16, 1 << 18
 
@@ -156,7 +157,7 @@ class ShockAccumulator:
         self._end_ns: int | None = None
         factors = np.exp2(np.ceil(np.log2(np.maximum(POINTS_A_CYCLE * lines_hz / sample_rate_hz, 1)))).astype(int)
         self._banks = [
-            (np.flatnonzero(factors == one), _Bank(count, lines_hz[factors == one], sample_rate_hz, one, q, quantity))
+            (np.flatnonzero(factors == one), self._bank(lines_hz[factors == one], one))
             for one in np.unique(factors).tolist()
         ]
 
@@ -205,6 +206,22 @@ class ShockAccumulator:
             notes=self._notes(),
         )
 
+    def _bank(self, lines_hz: Real, factor: int) -> "OscillatorBank":
+        # Imported here, since numba takes half a second.
+        from chladni.spectral.oscillator_bank import OscillatorBank
+
+        rate_hz = factor * self.sample_rate_hz
+        filters = [_coefficients(one, rate_hz, self._q, self._quantity) for one in lines_hz.tolist()]
+        numerators, denominators = (np.stack(part) for part in zip(*filters, strict=True))
+        return OscillatorBank(
+            len(self.channels),
+            lines_hz,
+            self.sample_rate_hz,
+            factor,
+            numerators=numerators,
+            denominators=denominators,
+        )
+
     def _begin(self, rows: Mask, values: Real) -> None:
         fresh = rows & ~self._known & np.isnan(self._offsets)
         self._offsets[fresh] = values[fresh]
@@ -232,63 +249,6 @@ class ShockAccumulator:
                 f"above {tenth_hz:g} Hz, a tenth of the sample rate, what the sampling has cut off may be missing"
             )
         return tuple(notes)
-
-
-class _Bank:
-    """Oscillators whose periods need so many times the samples, of all channels, with what they remember."""
-
-    def __init__(
-        self, channels: int, lines_hz: Real, sample_rate_hz: float, factor: int, q: float, quantity: ShockQuantity
-    ) -> None:
-        rate_hz = factor * sample_rate_hz
-        self._factor = factor
-        self._reach = 0 if factor == 1 else RESAMPLING_REACH
-        self._filters = [_coefficients(one, rate_hz, q, quantity) for one in lines_hz.tolist()]
-        # What is left of the motion after the record has its peaks within a period.
-        self._periods = [ceil(rate_hz / one) for one in lines_hz.tolist()]
-        self._state = np.zeros((lines_hz.size, channels, 2))
-        self._past = np.zeros((channels, 2 * self._reach))
-        self._age = np.zeros(channels, dtype=np.intp)
-        self.highest, self.lowest = np.zeros((channels, lines_hz.size)), np.zeros((channels, lines_hz.size))
-
-    def feed(self, rows: Index, values: Real) -> None:
-        """Take in the next samples of some channels."""
-        for age in np.unique(self._age[rows]).tolist():
-            same = self._age[rows] == age
-            self._respond(rows[same], self._finer(rows[same], values[same], age))
-
-    def end(self, rows: Index) -> None:
-        """Let the oscillators of some channels ring out, and be at rest again."""
-        if self._reach:
-            self.feed(rows, np.zeros((rows.size, self._reach)))
-        for line, period in enumerate(self._periods):
-            self._respond(rows, np.zeros((rows.size, period)), (line,))
-        self._state[:, rows], self._past[rows], self._age[rows] = 0.0, 0.0, 0
-
-    def _finer(self, rows: Index, values: Real, age: int) -> Real:
-        """Give the samples with those between them, band-limited, as late as the filter looks ahead."""
-        from scipy.signal import resample_poly
-
-        if not self._reach:
-            return values
-        known = np.concatenate([self._past[rows], values], axis=1)
-        self._past[rows] = known[:, -2 * self._reach :]
-        self._age[rows] = min(age + values.shape[1], self._reach)
-        # Nothing comes out for times before the first sample.
-        first = self._reach + max(0, self._reach - age)
-        fine = resample_poly(known, self._factor, 1, axis=1)
-        return np.asarray(fine[:, first * self._factor : (known.shape[1] - self._reach) * self._factor])
-
-    def _respond(self, rows: Index, samples: Real, lines: Sequence[int] | None = None) -> None:
-        from scipy.signal import lfilter
-
-        if not samples.shape[1]:
-            return
-        for line in range(len(self._filters)) if lines is None else lines:
-            b, a = self._filters[line]
-            response, self._state[line, rows] = lfilter(b, a, samples, axis=1, zi=self._state[line, rows])
-            self.highest[rows, line] = np.maximum(self.highest[rows, line], response.max(axis=1))
-            self.lowest[rows, line] = np.minimum(self.lowest[rows, line], response.min(axis=1))
 
 
 def _coefficients(natural_hz: float, rate_hz: float, q: float, quantity: ShockQuantity) -> tuple[Real, Real]:

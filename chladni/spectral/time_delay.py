@@ -143,11 +143,12 @@ def time_delay(
     reference, *others = (channel.name for channel in chosen.channels)
     before = _within(chosen.select(reference), low_hz, high_hz)
     correlations, found = [], []
+    transforms: _Transforms = {}
     for name in others:
         # One response at a time: of a long record, a few copies of many channels don't fit in memory.
         pair = chosen.select([reference, name])
         late = _within(pair.select(name), low_hz, high_hz)
-        correlations.append(_near_peak(before, late, longest_s, (low_hz, high_hz)))
+        correlations.append(_near_peak(before, late, longest_s, (low_hz, high_hz), transforms))
         del late
         found.append(_fitted(pair, correlations[-1], (low_hz, high_hz), resolution_hz))
     correlation = replace(
@@ -194,8 +195,15 @@ def _longest_run(series: TimeSeries) -> TimeSeries:
     return run
 
 
-def _correlated(series: TimeSeries, longest: int | None) -> CrossCorrelation:
-    """Correlate all channels with the first, up to so many samples of lag; half the record if none is given."""
+#: Conjugate spectrum of a reference, and the root of its energy, by the samples it's of and the points it has.
+_Transforms = dict[tuple[int, int, int], tuple[Complex, float]]
+
+
+def _correlated(series: TimeSeries, longest: int | None, transforms: _Transforms | None = None) -> CrossCorrelation:
+    """Correlate all channels with the first, up to so many samples of lag; half the record if none is given.
+
+    `transforms` keeps the transform of the reference for the next call of the same samples.
+    """
     import scipy.fft
 
     run = _longest_run(series)
@@ -213,8 +221,14 @@ def _correlated(series: TimeSeries, longest: int | None) -> CrossCorrelation:
         centred -= centred.mean()
         return scipy.fft.rfft(centred, points), float(np.sqrt(centred @ centred))
 
-    first, size = transformed(run.values[0])
-    np.conj(first, out=first)
+    transforms = {} if transforms is None else transforms
+    key = (run.start_time_ns, run.samples, points)
+    if key not in transforms:
+        # Responses that miss samples elsewhere come in turn; one transform is as large as the record.
+        transforms.clear()
+        first, size = transformed(run.values[0])
+        transforms[key] = np.conj(first, out=first), size
+    first, size = transforms[key]
     rows = np.empty((len(run.channels) - 1, 2 * longest + 1))
     for row, values in zip(rows, run.values[1:], strict=True):
         spectrum, own = transformed(values)
@@ -231,7 +245,11 @@ def _correlated(series: TimeSeries, longest: int | None) -> CrossCorrelation:
 
 
 def _near_peak(
-    reference: TimeSeries, response: TimeSeries, longest_s: float, band_hz: tuple[float, float]
+    reference: TimeSeries,
+    response: TimeSeries,
+    longest_s: float,
+    band_hz: tuple[float, float],
+    transforms: "_Transforms",
 ) -> CrossCorrelation:
     """Correlate a pair up to the lag that is asked for; where a higher one lies beyond, a peak has to stand inside.
 
@@ -240,10 +258,10 @@ def _near_peak(
     """
     pair = _beside(reference, response)
     longest = round(longest_s * pair.sample_rate_hz)
-    whole = _correlated(pair, None)
+    whole = _correlated(pair, None, transforms)
     reach = whole.lag_s.size // 2
     if not 0 < longest < reach:
-        return _correlated(pair, longest)
+        return _correlated(pair, longest, transforms)
     inside = slice(reach - longest, reach + longest + 1)
     # A correlation reaches to half the record.
     independent = 4 * (band_hz[1] - band_hz[0]) * float(whole.lag_s[-1])

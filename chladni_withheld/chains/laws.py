@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import numba as nb
 
-from chladni.models.integrator.cache_folder import CACHED
+from chladni.signals.cache_folder import CACHED
 from chladni_withheld.chains.equations import MASING_ELEMENTS
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])

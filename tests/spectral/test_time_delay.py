@@ -1,7 +1,10 @@
 """Correlation against SciPy, and delays against noise that is shifted by known times."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import scipy.fft
 from scipy.signal import correlate
 
 from chladni.signals.errors import EstimateError
@@ -125,3 +128,30 @@ def test_what_has_no_delay_is_refused(options, words):
     x = np.stack([*noise(2, 4000), np.ones(4000)])
     with pytest.raises(EstimateError, match=words):
         time_delay(series(x, rate_hz=RATE_HZ), **({"responses": "b"} | options))
+
+
+def test_the_reference_is_transformed_once_and_anew_where_other_samples_count(monkeypatch):
+    x = smooth_noise(4000, seed=3)
+    rows = np.stack([x, *(delayed(x, shift) for shift in (0.004, 0.007, 0.011))])
+    valid = np.ones(rows.shape, dtype=bool)
+    valid[2, 3000:] = False
+    record = replace(series(rows, rate_hz=RATE_HZ), valid=valid)
+    names = [channel.name for channel in record.channels]
+    alone = [time_delay(record, references=names[0], responses=name) for name in names[1:]]
+    lengths = []
+    transform = scipy.fft.rfft
+
+    def counted(x, n=None, **how):
+        # Those of segments, for the phase, state no length.
+        lengths.extend([] if n is None else [n])
+        return transform(x, n, **how)
+
+    monkeypatch.setattr(scipy.fft, "rfft", counted)
+    together = time_delay(record, references=names[0])
+    np.testing.assert_array_equal(together.delay_s, np.concatenate([one.delay_s for one in alone]))
+    np.testing.assert_allclose(together.delay_s, (0.004, 0.007, 0.011), atol=1e-5)
+    # Of the reference and of its response; the second response has fewer samples, the third has all again.
+    assert len(lengths) == 6
+    lengths.clear()
+    time_delay(replace(record, valid=None), references=names[0])
+    assert len(lengths) == 4

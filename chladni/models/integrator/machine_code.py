@@ -14,8 +14,8 @@ from numba import errors, types
 from numba.extending import intrinsic
 
 from chladni.models.core.port_law import LawFunction
-from chladni.models.integrator.cache_folder import CACHED
 from chladni.models.integrator.plane import BOOK
+from chladni.signals.cache_folder import CACHED
 from chladni.signals.errors import ModelError
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])

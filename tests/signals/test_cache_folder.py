@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from chladni.models.integrator import cache_folder
+from chladni.signals import cache_folder
 
 
 @pytest.fixture
