@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
@@ -35,8 +36,12 @@ def _has_no_example(path: Path) -> bool:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Heed that outside of this folder, too."""
+    """Heed that outside of this folder, too; what is collected is no garbage, which isn't searched for meanwhile."""
     config.pluginmanager.register(Examples())
+    gc.disable()
+    # A shell has it ignored in what runs in its background, and Ctrl-C would be in all that tests start.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -62,6 +67,7 @@ def pytest_collection_finish() -> None:
     """Tests and modules live to the end: each page that is closed would look through a million objects of theirs."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)
