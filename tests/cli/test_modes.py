@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from chladni.cli.main import main
 from tests.arm import FORCE, TOOL, short_arm
 from tests.impact_file import write_functions
 from tests.io.files.uff_makers import response_set
@@ -14,6 +15,14 @@ KEYS = {"frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std", "mpc
 @pytest.fixture(scope="module")
 def truth():
     return short_arm().modes
+
+
+@pytest.fixture(scope="module")
+def arm_functions(arm_log, tmp_path_factory):
+    """A universal file of the log's functions and modes."""
+    path = tmp_path_factory.mktemp("functions") / "arm.uff"
+    assert main(["modes", str(arm_log), "--setup", str(arm_log.with_name("setup.toml")), "--uff", str(path)]) == 0
+    return path
 
 
 def test_the_document_holds_the_true_modes_within_their_error_bars(run, arm_log, truth):
@@ -112,11 +121,8 @@ def test_bad_options_are_told_in_one_line(run, arm_log, arguments, words):
     assert outcome.err.count("\n") == 1
 
 
-def test_a_universal_file_gives_the_modes_of_its_functions(run, arm_log, tmp_path, truth):
-    setup = arm_log.with_name("setup.toml")
-    first = run("modes", arm_log, "--setup", setup, "--uff", tmp_path / "arm.uff", "--json", tmp_path / "arm.json")
-    assert first.code == 0, first.err
-    document = run("modes", tmp_path / "arm.uff", "--json", "-").document
+def test_a_universal_file_gives_the_modes_of_its_functions(run, arm_functions, truth):
+    document = run("modes", arm_functions, "--json", "-").document
     found = [mode["frequency_hz"] for mode in document["modes"]]
     assert found == pytest.approx(truth.frequency_hz, rel=1e-3)
 
@@ -186,10 +192,8 @@ def test_one_function_without_unit_costs_no_other(run, tmp_path):
         (["--reference", "/x.y"], "no reference '/x.y'; there are: /shaker"),
     ],
 )
-def test_options_of_samples_are_refused_for_functions(run, arm_log, tmp_path, option, words):
-    made = run("modes", arm_log, "--setup", arm_log.with_name("setup.toml"), "--uff", tmp_path / "arm.uff")
-    assert made.code == 0, made.err
-    outcome = run("modes", tmp_path / "arm.uff", *option)
+def test_options_of_samples_are_refused_for_functions(run, arm_functions, option, words):
+    outcome = run("modes", arm_functions, *option)
     assert outcome.code == 2
     assert words in outcome.err
 

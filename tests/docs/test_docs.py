@@ -6,7 +6,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
-from typer.testing import CliRunner
+import typer
 
 import chladni
 from chladni.cli.main import app
@@ -35,12 +35,11 @@ def test_every_command_is_in_the_guide():
 @pytest.mark.parametrize("document", ["README.md", "docs/guide.md"])
 def test_options_that_are_named_exist(document):
     text = (ROOT / document).read_text(encoding="utf-8")
-    helps = " ".join(
-        CliRunner().invoke(app, [command.callback.__name__, "--help"], env={"COLUMNS": "200"}).output
-        for command in app.registered_commands
-    )
-    for option in set(re.findall(r"(?<=[ `\[(])--[a-z][a-z-]+", text)) - {"--help"}:
-        assert option in helps, option
+    commands = typer.main.get_command(app).commands.values()
+    known = {option for command in commands for one in command.params for option in (*one.opts, *one.secondary_opts)}
+    named = set(re.findall(r"(?<=[ `\[(])--[a-z][a-z-]+", text))
+    assert len(named) > 3
+    assert named - {"--help"} <= known
 
 
 def test_the_gate_runs_the_command_that_the_readme_gives():

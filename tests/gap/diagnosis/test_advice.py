@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import pytest
+
 from chladni.gap.diagnosis.advice import measure_next
 from chladni.gap.diagnosis.belief import Belief
 from chladni.gap.diagnosis.diagnose import diagnose
@@ -58,6 +60,18 @@ def studied(log: Measurement) -> Study:
     return study_of(three_bodies(), log, leave_out=frozenset(), own={})
 
 
+@pytest.fixture(scope="module")
+def hardening() -> Study:
+    """Of a joint that hardens, seen by all three sensors."""
+    return studied(log_of(HARDENING))
+
+
+@pytest.fixture(scope="module")
+def hardening_of_one() -> Study:
+    """The same seen by one."""
+    return studied(log_of(HARDENING, outputs=[2]))
+
+
 def test_a_diagnosis_asks_for_what_tells_its_candidates_apart() -> None:
     # Both scale the only channel.
     found = diagnose(three_bodies(), [log_of(gain("hammer"), outputs=[2])], leave_out=ONLY_GAINS)
@@ -102,20 +116,19 @@ def test_an_effect_in_loud_noise_asks_for_a_higher_level() -> None:
     assert "unseen" not in said
 
 
-def test_an_only_sensor_is_asked_for_another_one() -> None:
-    study = studied(log_of(HARDENING, outputs=[2]))
+def test_an_only_sensor_is_asked_for_another_one(hardening: Study, hardening_of_one: Study) -> None:
+    study = hardening_of_one
     causes = answered(study, entered(study, (HARDENING,)))
     tuned = replace(causes.tuned, log_evidence=causes.best.log_evidence - 100.0)
     lone = believing(study, tuned, [causes.best])
     said = measure_next(study, lone, seed=0) or ""
     assert said.startswith("One sensor can't tell where a force acts: add ")
     assert measure_next(study, believing(study, tuned, [], "none"), seed=0) is None
-    several = studied(log_of(HARDENING))
-    assert measure_next(several, answered(several, entered(several, (HARDENING,))), seed=0) is None
+    causes = answered(hardening, entered(hardening, (HARDENING,)))
+    assert measure_next(hardening, causes, seed=0) is None
 
 
-def test_what_an_only_sensor_leaves_unknown_asks_for_another_one() -> None:
-    one, all_three = studied(log_of(HARDENING, outputs=[2])), studied(log_of(HARDENING))
-    said = measure_next(one, answered(one, [], "unknown"), seed=0) or ""
+def test_what_an_only_sensor_leaves_unknown_asks_for_another_one(hardening: Study, hardening_of_one: Study) -> None:
+    said = measure_next(hardening_of_one, answered(hardening_of_one, [], "unknown"), seed=0) or ""
     assert said.startswith("One sensor can't tell where a force acts: add ")
-    assert measure_next(all_three, answered(all_three, [], "unknown"), seed=0) is None
+    assert measure_next(hardening, answered(hardening, [], "unknown"), seed=0) is None

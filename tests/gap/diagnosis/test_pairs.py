@@ -10,7 +10,7 @@ from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.diagnosis import pairs
 from chladni.gap.diagnosis.pairs import second_causes
 from chladni.gap.diagnosis.search import Search
-from chladni.gap.diagnosis.study import recovered_states, study_of
+from chladni.gap.diagnosis.study import Study, recovered_states, study_of
 from chladni.gap.explanation.hypotheses import hypothesis_of
 from chladni.gap.location.locate import Location, explained_share, locate, located_pairs
 from chladni.gap.plant.tunable import Tunables
@@ -108,15 +108,19 @@ def test_two_forces_are_told_where_they_explain_much_more_than_one() -> None:
     assert pairs._two_forces(one, located_pairs(one)) is None
 
 
-def test_the_leading_place_is_paired_with_those_that_were_not_followed() -> None:
-    study = study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
+@pytest.fixture(scope="module")
+def study() -> Study:
+    """Of an arm that lacks nothing."""
+    return study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
+
+
+def test_the_leading_place_is_paired_with_those_that_were_not_followed(study: Study) -> None:
     first = study.location.ranked[0]
     pairs = located_pairs(replace(study.location, ranked=(first,)))
     assert {pair.places[1] for pair in pairs} == set(study.location.places) - {first.places[0]}
 
 
-def test_a_place_that_explains_as_much_as_the_leading_ones_is_paired_with_all_too() -> None:
-    study = study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
+def test_a_place_that_explains_as_much_as_the_leading_ones_is_paired_with_all_too(study: Study) -> None:
     first, second, third = study.location.ranked[:3]
     followed = {one.places[0] for one in (first, second, third)}
     far = next(place for place in study.location.places if place not in followed)

@@ -40,8 +40,7 @@ def left_by(places):
 
 
 def test_a_place_that_explains_less_than_another_one_is_left_out() -> None:
-    log = measured(seconds=4.0)
-    study = study_of(arm(), log, leave_out=frozenset(), own={})
+    study = study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
     location = study.location
     first = replace(
         location.ranked[0], profile=replace(location.ranked[0].profile, misfit=location.ranked[0].profile.expected)
