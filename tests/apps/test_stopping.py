@@ -108,8 +108,8 @@ def test_what_is_ignored_stays_ignored(tmp_path: Path) -> None:
         (signal.SIGTERM, "parent"),
         (signal.SIGHUP, "group"),
         (signal.SIGKILL, "parent"),
-        pytest.param(signal.SIGTERM, "group", marks=pytest.mark.slow),
-        pytest.param(signal.SIGINT, "parent", marks=pytest.mark.slow),
+        pytest.param(signal.SIGTERM, "group", marks=pytest.mark.nightly),
+        pytest.param(signal.SIGINT, "parent", marks=pytest.mark.nightly),
         pytest.param(signal.SIGINT, "group", marks=pytest.mark.slow),
     ],
 )

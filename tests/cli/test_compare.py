@@ -75,6 +75,7 @@ def test_modes_of_both_are_compared_when_asked_for(run, arm_log, tmp_path):
     assert run("compare", arm_log, louder, "--json", "-").document["modes"] is None
 
 
+@pytest.mark.nightly
 def test_modes_from_responses_alone_are_compared_too(run, arm_log):
     document = run("compare", arm_log, arm_log, "--operational", "--json", "-").document
     assert {one["fate"] for one in document["modes"]} == {"unchanged"}

@@ -62,6 +62,7 @@ def test_a_sensor_that_shows_too_much_is_named_and_the_model_written_with_it(
     assert (again["verdict"], again["causes"]) == ("none", [])
 
 
+@pytest.mark.nightly
 def test_a_study_gives_the_document_of_the_command_to_the_byte(
     run: Run, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
