@@ -35,7 +35,7 @@ PERIOD, PERIODS = 2000, 3
     scope="module", params=[pytest.param((), marks=pytest.mark.nightly), all_but()], ids=["catalogue", "few"]
 )
 def friction(request: pytest.FixtureRequest) -> Diagnosis:
-    return diagnose(arm(), [measured((FRICTION,), seconds=5.0)], leave_out=frozenset(request.param))
+    return diagnose(arm(), [measured((FRICTION,), seconds=3.0)], leave_out=frozenset(request.param))
 
 
 @pytest.mark.slow

@@ -61,7 +61,7 @@ def pushed(seed: int, count: int):
     return np.tile(80.0 * slow / slow.std(), count)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_log_without_periods_is_begun_by_what_its_quiet_band_tells():
     rubbing = axis().with_effects((attached("coulomb_friction", "j0", {"force": 30.0}),))
     first, _ = measured(rubbing, pushed(1, 4), noise=1e-5, seed=7)

@@ -84,6 +84,7 @@ def test_a_cube_whose_middle_lies_beside_rest_is_told_with_its_square():
     assert best.values["quadratic"] == pytest.approx(values["quadratic"], rel=0.15)
 
 
+@pytest.mark.nightly
 def test_teeth_are_told_with_their_second_harmonic():
     values = {"amplitude": 6.0, "period": 1.3e-3, "phase": 0.8, "second_sine": -0.25, "second_cosine": 0.2}
     teeth = attached("ripple", "j0", values, variant="harmonics")
@@ -99,7 +100,7 @@ def test_teeth_are_told_with_their_second_harmonic():
     assert sine.misfit > 3 * best.misfit
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_bristles_that_bend_within_a_sample_are_found():
     dahl = attached("coulomb_friction", "j0", {"force": 20.0, "presliding": 2e-6}, variant="bristle")
     screen = screened_at_an_oscillator(dahl, measures="acceleration", samples=6000, rms=100.0)

@@ -40,7 +40,7 @@ def near(share: float):
     return hypothesis_of((attached("ripple", "j0", off),), np.zeros(6))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_teeth_whose_run_is_lost_from_a_near_start_are_found_over_windows(made) -> None:
     contest, shooting = made
     lost = contest.enter(near(1.03))

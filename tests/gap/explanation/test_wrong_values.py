@@ -59,6 +59,7 @@ def test_where_all_values_are_right_none_is_doubted() -> None:
     assert wrong_values(location, tunables) == []
 
 
+@pytest.mark.nightly
 def test_a_body_that_is_heavier_than_its_tolerance_carries_something() -> None:
     location, tunables = located({}, attached("added_mass", "b1", {"mass": 2.5}))
     assert location.tuned.chi > 5.0

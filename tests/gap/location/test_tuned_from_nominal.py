@@ -69,6 +69,7 @@ def test_all_but_one_of_twenty():
     assert count >= 19
 
 
+@pytest.mark.nightly
 def test_linear_effects_of_the_model_take_part():
     lag = attached("lag", "hammer", {"time_constant": 1e-3})
     model = three_bodies().with_effects([lag])

@@ -95,8 +95,15 @@ def central(problem, z, transient, forces, step=1e-2):
     return np.array(found) / (12 * step)
 
 
-@pytest.mark.parametrize("name", MODELS)
-@pytest.mark.parametrize("segments", [False, True])
+# In the gate each model over one of the two kinds of lines.
+@pytest.mark.parametrize(
+    ("name", "segments"),
+    [
+        pytest.param(name, segments, marks=() if place % 2 == segments else pytest.mark.nightly)
+        for place, name in enumerate(MODELS)
+        for segments in (False, True)
+    ],
+)
 def test_slopes_are_the_limit_of_differences(name, segments):
     make, sites = MODELS[name]
     problem = problem_of(make(), segments=segments)

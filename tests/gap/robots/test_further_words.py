@@ -39,7 +39,7 @@ LAWS = {
 @pytest.mark.parametrize(
     "word",
     [
-        word if word in ("ripple", "dead_zone", "joint_elasticity") else pytest.param(word, marks=pytest.mark.nightly)
+        word if word in ("dead_zone", "joint_elasticity") else pytest.param(word, marks=pytest.mark.nightly)
         for word in LAWS
     ],
 )

@@ -41,7 +41,7 @@ def scatter(colour: tuple[float, ...], coloured: bool) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("colour", [WHITE, SLOW, RINGING])
+@pytest.mark.parametrize("colour", [pytest.param(WHITE, marks=pytest.mark.nightly), SLOW, RINGING])
 def test_spreads_are_those_of_many_logs(colour: tuple[float, ...]) -> None:
     assert scatter(colour, True) == pytest.approx(1.0, abs=0.35)
 

@@ -62,23 +62,30 @@ def test_a_start_at_rest_is_not_taken_for_motion(signals):
 @pytest.mark.parametrize(
     ("true", "start", "fitted"),
     [
-        (
+        pytest.param(
             attached("coulomb_friction", "j1", {"force": 8.0, "creep_speed": 1e-3}),
             attached("coulomb_friction", "j1", {"force": 4.0, "creep_speed": 1e-3}),
             ["force"],
+            marks=pytest.mark.nightly,
         ),
         (
             attached("hysteresis", "j1", {"force": 10.0, "yield": 3e-5}),
             attached("hysteresis", "j1", {"force": 6.0, "yield": 6e-5}),
             ["force", "yield"],
         ),
-        (
+        pytest.param(
             attached("quadratic_damping", "j1", {"coefficient": 2e3}),
             attached("quadratic_damping", "j1", {"coefficient": 5e2}),
             ["coefficient"],
+            marks=pytest.mark.nightly,
         ),
         (attached("delay", "hammer", {"delay": 1.3e-3}), attached("delay", "hammer", {"delay": 2e-3}), ["delay"]),
-        (attached("gain_error", "a1", {"gain": 0.8}), attached("gain_error", "a1", {"gain": 1.0}), ["gain"]),
+        pytest.param(
+            attached("gain_error", "a1", {"gain": 0.8}),
+            attached("gain_error", "a1", {"gain": 1.0}),
+            ["gain"],
+            marks=pytest.mark.nightly,
+        ),
         (
             attached("time_offset", "a1", {"offset": 4e-4}),
             attached("time_offset", "a1", {"offset": 1e-5}),
@@ -185,6 +192,7 @@ def axis_log(folder, model, outputs, inputs):
     )  # fmt: skip
 
 
+@pytest.mark.nightly
 def test_friction_of_a_robot_axis_open_loop_in_windows(shared_data):
     """Published: 95.1 kg, 203.5 N s/m, 20.4 N, offset -3.2 N; a linear fit takes 409 N s/m for the viscous part."""
     model = load_model(shared_data / "models" / "emps.toml")
