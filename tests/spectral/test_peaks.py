@@ -47,9 +47,17 @@ def noise(kind, random, samples):
     return signal.lfilter([1.0], [1.0, -0.999], white)
 
 
-@pytest.mark.parametrize("kind", ["white", "band", "falling"])
+SETTINGS = ((4000, 0.5, "hann"), (4000, 1.0, "boxcar"), (20_000, 1.0, "hann"))
+
+
+# In the gate each kind of noise at one of the settings.
 @pytest.mark.parametrize(
-    ("samples", "resolution_hz", "window"), [(4000, 0.5, "hann"), (4000, 1.0, "boxcar"), (20_000, 1.0, "hann")]
+    ("kind", "samples", "resolution_hz", "window"),
+    [
+        pytest.param(kind, *each, marks=() if place == number else pytest.mark.nightly)
+        for number, kind in enumerate(("white", "band", "falling"))
+        for place, each in enumerate(SETTINGS)
+    ],
 )
 def test_peakless_noise_gives_no_peak(kind, samples, resolution_hz, window):
     random = np.random.default_rng(11)

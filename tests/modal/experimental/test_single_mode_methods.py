@@ -177,7 +177,7 @@ def windowed_noise(made, window, std, seed):
     return replace(made, values=made.values + added, std=np.full(made.std.shape, std))
 
 
-@pytest.mark.parametrize("kind", ["hann", "exponential", "boxcar"])
+@pytest.mark.parametrize("kind", ["hann", "exponential", pytest.param("boxcar", marks=pytest.mark.nightly)])
 def test_noise_that_a_window_has_smeared_over_lines_is_reckoned_with(method, kind):
     """The scatter of 60 runs is known to 9 %; half-power errors hold the share of a line that it never is below."""
     samples, decay = 2000, 0.3

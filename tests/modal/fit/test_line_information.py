@@ -31,7 +31,9 @@ def test_whole_responses_have_independent_lines(averaging):
     assert line_correlation_factor(Provenance(window="hann", averaging=averaging, averages=8)) == 1.0
 
 
-@pytest.mark.parametrize(("window", "overlap"), [("hann", 0.5), ("hann", 0.75), ("boxcar", 0.0)])
+@pytest.mark.parametrize(
+    ("window", "overlap"), [("hann", 0.5), pytest.param("hann", 0.75, marks=pytest.mark.nightly), ("boxcar", 0.0)]
+)
 def test_sums_over_lines_scatter_so(window, overlap):
     # An output of pure noise over an input of noise: the mean over lines of H scatters by the factor over its lines.
     rng = np.random.default_rng(4)

@@ -74,7 +74,7 @@ def test_unknown_variance_is_found_from_what_is_left():
     assert beside.chi_square == pytest.approx((2 * 15 - 2) / (2 * 15), abs=0.1)
 
 
-@pytest.mark.parametrize("share", [0.0, 1.0])
+@pytest.mark.parametrize("share", [pytest.param(0.0, marks=pytest.mark.nightly), 1.0])
 def test_intervals_without_stated_variance_hold_the_truth(share):
     """Noise on every line alike, or as a share of the function on its lines: 2 % of either."""
     truth, inside, total = chain(damping=0.002), 0, 0
@@ -195,7 +195,7 @@ def binomial_limits(trials):
 @pytest.mark.parametrize(
     ("make", "at", "runs", "options"),
     [
-        (independent_noise, (0,), 90, {"lines": 200}),
+        pytest.param(independent_noise, (0,), 90, {"lines": 200}, marks=pytest.mark.nightly),
         (independent_noise, (0, 2), 90, {"lines": 200}),
         (few_periods, (0,), 90, {"lines": 200}),
         pytest.param(averaged_random, (0,), 40, {"cycles": 600, "resolution_hz": 1 / 40}, marks=pytest.mark.nightly),

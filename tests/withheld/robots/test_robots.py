@@ -24,8 +24,8 @@ from chladni_withheld.robots.scene import RefusedError, draw_scene  # noqa: E402
 from chladni_withheld.score import scored  # noqa: E402
 from chladni_withheld.vocabulary import FAMILY_OF, OUTSIDE  # noqa: E402
 
-#: Between motor and link, at the encoder, from outside. Friction, payload and delay have tests of their own.
-ONE_OF_EACH_KIND = {"joint_elasticity", "encoder_offset", "push"}
+#: Between motor and link, from outside. Friction, payload and delay have tests of their own.
+ONE_OF_EACH_KIND = {"joint_elasticity", "push"}
 
 
 def staged(seed, *, floats=False):
@@ -132,6 +132,7 @@ def test_what_is_told_of_bases_that_float_is_scored():
     assert not mark("d", none, wrong).whole_is_right
 
 
+@pytest.mark.nightly
 def test_friction_takes_energy_and_never_gives_any():
     rng, stage = staged(2)
     cause = ALL_CAUSES["coulomb_friction"](rng, stage, 1)
