@@ -168,20 +168,29 @@ class MachineJoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coupling:
-    """Friction of ``speed of the first joint + sense times that of the second``, whose gears run in one another.
+    """What acts on ``position of the first joint + ratio times that of the second``: gears, a cable over both.
 
     Attributes
     ----------
-    joints, sense
-        Names; 1 or -1.
+    joints, ratio
+        Names; 1 or -1 of gears that run in one another.
     friction, damping
         N m; N m s/rad.
+    stiffness, torque
+        A spring's, N m/rad, and what it pulls back with where both joints are at zero, N m.
     """
 
     joints: tuple[str, str]
-    sense: float
+    ratio: float
     friction: float = 0.0
     damping: float = 0.0
+    stiffness: float = 0.0
+    torque: float = 0.0
+
+    @property
+    def rest(self) -> float:
+        """Of a spring: where it pulls nothing."""
+        return -self.torque / self.stiffness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -199,7 +208,7 @@ class Machine:
     tilt
         Angles by which the base is turned about its x and y axes, rad.
     couplings
-        Between neighbours.
+        Between two joints of a chain.
     imu_turned
         Rotation vector in its own axes by which the IMU of a base that floats is turned from how it's described, rad.
     """

@@ -76,7 +76,8 @@ def longest_step_s(machine: Machine, names: Sequence[str]) -> float:
     inertia = np.diag(inertia_rms(model, np.asarray(model.qpos0, dtype=np.float64)[:, None]))
     found = _LONGEST_S
     for one in _chosen(machine, names):
-        stiffness = one.gains()[0] + one.stiffness + sum(each.stiffness for each in one.stops)
+        springs = [*one.stops, *(each for each in machine.couplings if one.joint.name in each.joints)]
+        stiffness = one.gains()[0] + one.stiffness + sum(each.stiffness for each in springs)
         own = float(inertia[one.joint.dof])
         if one.transmission is not None:
             stiffness, own = max(stiffness, tooth_of(one.transmission, own)), min(own, one.transmission.inertia)
@@ -115,24 +116,30 @@ def model_of(machine: Machine, names: Sequence[str]) -> Any:
 
 
 def _coupled(machine: Machine) -> Any:
-    """Compile the description anew with tendons, which rub as joints of coupled gears do."""
+    """Compile the description anew with tendons, which rub and pull as gears and cables of two joints do."""
     import mujoco
 
     def compiled(found: Description) -> Any:
         spec = mujoco.MjSpec.from_string(found.xml)
         for each in machine.couplings:
             tendon = spec.add_tendon()
-            for joint, share in zip(each.joints, (1.0, each.sense), strict=True):
+            for joint, share in zip(each.joints, (1.0, each.ratio), strict=True):
                 tendon.wrap_joint(joint, share)
             tendon.frictionloss = each.friction
-            # Some versions have coefficients of higher order beside it.
-            damping = np.zeros(np.size(tendon.damping))
-            damping[0] = each.damping
-            tendon.damping = damping if damping.size > 1 else each.damping
+            tendon.damping = _linear(tendon.damping, each.damping)
+            if each.stiffness:
+                tendon.stiffness = _linear(tendon.stiffness, each.stiffness)
+                tendon.springlength = [each.rest, each.rest]
         return spec.compile()
 
     robot = machine.robot
     return made_of(robot.description, None if robot.robot_file is None else robot.base, compiled, meshes=False)
+
+
+def _linear(before: Any, number: float) -> Any:
+    """Give a coefficient as this version has it: some have those of higher order beside it."""
+    size = np.size(before)
+    return [number, *np.zeros(size - 1)] if size > 1 else number
 
 
 def _set_inertials(model: Any, machine: Machine) -> None:

@@ -226,8 +226,10 @@ class MjcfEdit:
                 for name, number in (("frictionloss", each.friction), ("damping", each.damping))
                 if number
             }
+            if each.stiffness:
+                fixed.attrib |= {"stiffness": written(each.stiffness), "springlength": written(each.rest)}
             tendons.append(fixed)
-            for joint, share in zip(each.joints, (1.0, each.sense), strict=True):
+            for joint, share in zip(each.joints, (1.0, each.ratio), strict=True):
                 fixed.append(fixed.makeelement("joint", {"joint": joint, "coef": written(share)}))
 
 

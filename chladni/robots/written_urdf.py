@@ -45,8 +45,9 @@ class UrdfEdit:
             option = _child(_child(self._root, "mujoco"), "option")
             option.set("gravity", written(gravity_of(self._machine.robot.model, self._machine.tilt)))
         for each in self._machine.couplings:
+            shared = "a spring" if each.stiffness else "friction"
             self.not_held.append(
-                f"{each.joints[0]} and {each.joints[1]}: friction that they share; URDF has none, MJCF has tendons"
+                f"{each.joints[0]} and {each.joints[1]}: {shared} that they share; URDF has none, MJCF has tendons"
             )
         return False
 

@@ -166,15 +166,26 @@ def test_a_velocity_servo_follows_as_a_first_order_lag(rotors: Machine) -> None:
 
 
 def test_coupled_friction_takes_from_the_sum_of_speeds_alone(rotors: Machine) -> None:
-    machine = replace(rotors, couplings=(Coupling(joints=("one", "two"), sense=1.0, damping=0.2),))
+    machine = replace(rotors, couplings=(Coupling(joints=("one", "two"), ratio=1.0, damping=0.2),))
     found = courses(machine, asked=0.0, kind="effort", start=0.0, speed=2.0)
     rate = 2.0 * 0.2 / INERTIA
     np.testing.assert_allclose(found.sum(axis=0), 2.0 * (1.0 - np.exp(-rate * AT_S)) / rate, atol=1e-3)
     np.testing.assert_allclose(found[0] - found[1], 2.0 * AT_S, atol=1e-9)
 
 
+def test_a_spring_between_two_joints_turns_them_against_each_other(rotors: Machine) -> None:
+    # What it stretches swings as one rotor on it; what it doesn't goes on as it went.
+    stiffness, ratio, rest = 0.8, -0.5, 0.3
+    spring = Coupling(joints=("one", "two"), ratio=ratio, stiffness=stiffness, torque=-stiffness * rest)
+    found = courses(replace(rotors, couplings=(spring,)), asked=0.0, kind="effort", start=0.0, speed=2.0)
+    turns = np.sqrt(stiffness * (1.0 + ratio**2) / INERTIA)
+    stretched = rest + 2.0 / turns * np.sin(turns * AT_S) - rest * np.cos(turns * AT_S)
+    np.testing.assert_allclose(found[0] + ratio * found[1], stretched, atol=2e-3)
+    np.testing.assert_allclose(ratio * found[0] - found[1], 2.0 * ratio * AT_S, atol=1e-6)
+
+
 def test_coupled_coulomb_friction_brings_the_sum_to_rest_and_holds_it(rotors: Machine) -> None:
-    machine = replace(rotors, couplings=(Coupling(joints=("one", "two"), sense=1.0, friction=0.4),))
+    machine = replace(rotors, couplings=(Coupling(joints=("one", "two"), ratio=1.0, friction=0.4),))
     found = courses(machine, asked=0.0, kind="effort", start=0.0, speed=2.0).sum(axis=0)
     slows = 2.0 * 0.4 / INERTIA
     until = np.minimum(AT_S, 2.0 / slows)

@@ -39,7 +39,10 @@ CHANGES = {
     "payload": lambda one: replace(one, inertial=one.inertial + np.array([np.zeros(10), POINT])),
     "tilt": lambda one: replace(one, tilt=(0.1, -0.2)),
     "coupling": lambda one: replace(
-        one, couplings=(Coupling(joints=("shoulder", "elbow"), sense=-1.0, friction=0.5, damping=0.8),)
+        one, couplings=(Coupling(joints=("shoulder", "elbow"), ratio=-1.0, friction=0.5, damping=0.8),)
+    ),
+    "coupled spring": lambda one: replace(
+        one, couplings=(Coupling(joints=("shoulder", "elbow"), ratio=0.7, stiffness=25.0, torque=-6.0),)
     ),
 }  # fmt: skip
 
@@ -61,7 +64,7 @@ def test_mjcf_moves_in_mujoco_as_the_machine_does(name: str, described: Machine,
     assert apart < 0.03 * changes
 
 
-@pytest.mark.parametrize("name", [one for one in CHANGES if one != "coupling"])
+@pytest.mark.parametrize("name", [one for one in CHANGES if "coupl" not in one])
 def test_mjcf_reads_back_as_the_machine(name: str, described: Machine, tmp_path: Path) -> None:
     machine = CHANGES[name](described)
     back = as_described(load_robot(write_robot(machine, tmp_path / "found.xml").robot))
@@ -197,7 +200,7 @@ def test_urdf_and_its_robot_file_move_as_the_machine_does(of_urdf: Machine, tmp_
 
 def test_what_urdf_lacks_is_told(of_urdf: Machine, tmp_path: Path) -> None:
     machine = changed(of_urdf, 1, armature=0.04, quadratic=0.1, stiffness=3.0, delay_s=0.02)
-    machine = replace(machine, couplings=(Coupling(joints=("shoulder", "elbow"), sense=1.0, friction=0.5),))
+    machine = replace(machine, couplings=(Coupling(joints=("shoulder", "elbow"), ratio=1.0, friction=0.5),))
     told = write_robot(machine, tmp_path / "found.urdf").not_held
     assert len(told) == 5
     for word in ("armature 0.04 kg m^2", "square of the speed", "a spring of 3", "share", "elbow 20 ms"):

@@ -8,7 +8,7 @@ import numpy as np
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.joint_words import ALONG_THE_WAY, way_of
 from chladni.gap.robots.solved import Solved
-from chladni.gap.robots.term import SENSES, Term
+from chladni.gap.robots.term import Term
 from chladni.gap.robots.tolerances import INERTIAL_NAMES, LOOP_S, tolerated_inertia
 from chladni.gap.robots.torques import ALL_COMMANDS, Torques
 from chladni.gap.robots.transmission_words import AT_MOTOR, LEAST_ROTOR
@@ -191,11 +191,8 @@ class _Reading:
             if not term.is_coupling:
                 continue
             one, _, other = term.site.partition("~")
-            number, dry = max(float(values[0]), 0.0), term.word == "coulomb_friction"
-            yield Coupling(
-                joints=(one, other), sense=SENSES[str(term.variant)],
-                friction=number if dry else 0.0, damping=0.0 if dry else number,
-            )  # fmt: skip
+            numbers = dict(zip(_COUPLED[term.word], values.tolist(), strict=True))
+            yield Coupling(joints=(one, other), ratio=term.ratio, **numbers)
 
 
 def _towards(described: float, found: float, share: float) -> float:
@@ -208,6 +205,9 @@ def _carried(values: Real) -> Real:
     inertia = (moment @ moment * np.eye(3) - np.outer(moment, moment)) / mass + max(float(values[4]), 0.0) * np.eye(3)
     return np.concatenate([values[:4], inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
 
+
+#: Of what two joints share: where the numbers of a word go.
+_COUPLED = {"coulomb_friction": ("friction",), "viscous_friction": ("damping",), "joint_spring": ("stiffness", "torque")}
 
 Law = Callable[[MachineJoint, Term, Real, Torques], MachineJoint]
 

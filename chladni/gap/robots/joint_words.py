@@ -21,6 +21,8 @@ _SLIDES, _YIELDS = (0.01, 0.03, 0.08), (0.16, 0.32, 0.64)
 ALONG_THE_WAY, PRESLIDING = "along the way", "presliding"
 #: Quantiles of a joint's way at which a stop begins.
 _STOPS = (0.6, 0.75, 0.85, 0.93)
+#: Of a spring between two joints: by which the second winds it up over the first, where a search begins.
+_RATIOS = (-1.0, 1.0)
 #: Friction that grows with the load, before a log is seen.
 _BY_LOAD = 0.3
 #: Fewest waves of a ripple that a joint passes, lines between two that can be told apart, highest peaks tried.
@@ -171,13 +173,13 @@ def coupled(torques: Torques) -> Iterator[Term]:
             for word, column, number in (("coulomb_friction", sign, dry), ("viscous_friction", smooth, wet)):
                 yield Term(
                     word=word, site=f"{one.name}~{other.name}", numbers=(number,),
-                    make=partial(_at_both, torques, row, column, sense),
+                    make=partial(_at_both, torques, (row, row + 1), sense, column),
                     rows=(row, row + 1), variant=variant, rare=True,
                 )  # fmt: skip
 
 
-def _at_both(torques: Torques, row: int, column: Real, sense: float) -> Real:
-    return np.asarray(at_row(torques, row, column) + sense * at_row(torques, row + 1, column))
+def _at_both(torques: Torques, rows: tuple[int, int], ratio: float, *columns: Real) -> Real:
+    return np.asarray(at_row(torques, rows[0], *columns) + ratio * at_row(torques, rows[1], *columns))
 
 
 def springs(torques: Torques) -> Iterator[Term]:
@@ -191,6 +193,33 @@ def springs(torques: Torques) -> Iterator[Term]:
         yield law(torques, row, "joint_spring", partial(_line, torques.position[row]), pull, constant)
         for side in (1.0, -1.0):
             yield from _stop(torques, row, joint, side, pull)
+
+
+def springs_between(torques: Torques) -> Iterator[Term]:
+    """Springs of which two joints of a chain wind up, as a cable, a belt or an elastic band over both."""
+    for first, one in torques.rows:
+        for second, other in torques.rows:
+            if one.kind == other.kind and first != second and other.link in torques.robot.hanging(one):
+                yield from _spring_between(torques, (first, second), one, other)
+
+
+def _spring_between(torques: Torques, rows: tuple[int, int], one: RobotJoint, other: RobotJoint) -> list[Term]:
+    often = min(usual(torques, row) for row in rows)
+    force, _, stiffness = units(one)
+
+    def make(ratio: float) -> Term:
+        way = torques.position[rows[0]] + ratio * torques.position[rows[1]]
+        mean, travel = float(np.mean(way)), rms(way - np.mean(way))
+        numbers = (
+            Number(name="stiffness", unit=stiffness, scale=often / travel, least=0.0),
+            Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel)),
+        )
+        return Term(
+            word="joint_spring", site=f"{one.name}~{other.name}", numbers=numbers, rows=rows, rare=True,
+            make=lambda: _at_both(torques, rows, ratio, *_line(way)),
+        )  # fmt: skip
+
+    return formed(make, np.array(_RATIOS), name="ratio", unit="1")
 
 
 def _line(position: Real) -> tuple[Real, ...]:

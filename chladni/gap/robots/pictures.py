@@ -9,7 +9,7 @@ from chladni.gap.records.diagnosis import GapSignals
 from chladni.gap.records.robot import JointMotion, Over, TorqueMap
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forward import Confirmed
-from chladni.gap.robots.term import SENSES, Term
+from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import Torques
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Index, Real
@@ -118,10 +118,10 @@ class _Maps:
         self._left = self._torques.missing - contest.explained(best)
 
     def all(self) -> Iterator[TorqueMap]:
-        pairs = {term.rows: term for term, *_ in self._laws if term.is_coupling}
+        pairs = {(term.rows, _over(term)): term for term, *_ in self._laws if term.is_coupling}
         for row, joint in self._torques.rows:
             yield from self._of_joint(row, joint)
-            yield from (self._of_pair(term) for rows, term in pairs.items() if max(rows) == row)
+            yield from (self._of_pair(term) for (rows, _), term in pairs.items() if max(rows) == row)
 
     def _of_joint(self, row: int, joint: RobotJoint) -> Iterator[TorqueMap]:
         torques = self._torques
@@ -134,16 +134,16 @@ class _Maps:
         )  # fmt: skip
         own = [one for one in self._laws if one[0].rows[0] == row and not one[0].is_coupling]
         for over, motion, has in courses:
-            laws = [one for one in own if (one[0].word in _BY_SPEED) == (over == "velocity")]
+            laws = [one for one in own if _over(one[0]) == over]
             yield self._map(joint.name, over, row, motion, has, laws)
 
     def _of_pair(self, term: Term) -> TorqueMap:
-        """Friction of two speeds together, as the outer joint feels it."""
-        torques, (inner, outer) = self._torques, term.rows
-        sense = SENSES[str(term.variant)]
-        motion = torques.velocity[inner] + sense * torques.velocity[outer]
-        laws = [one for one in self._laws if one[0].site == term.site]
-        return self._map(term.site, "velocity", outer, motion, 0.0 * motion, laws, sense)
+        """What acts on the motion of two joints together, as the outer one feels it."""
+        (inner, outer), over = term.rows, _over(term)
+        motions = self._torques.velocity if over == "velocity" else self._torques.position
+        motion = motions[inner] + term.ratio * motions[outer]
+        laws = [one for one in self._laws if one[0].site == term.site and _over(one[0]) == over]
+        return self._map(term.site, over, outer, motion, 0.0 * motion, laws, term.ratio)
 
     def _map(
         self,
@@ -153,12 +153,12 @@ class _Maps:
         motion: Real,
         described: Real,
         laws: Sequence[tuple[Term, Real, Real]],
-        sense: float = 1.0,
+        ratio: float = 1.0,
     ) -> TorqueMap:
         torques = self._torques
         own = sum((_added(term, values, row) for term, values, _ in laws), start=np.zeros_like(motion))
         moving = np.flatnonzero(torques.moving[row])
-        rows = (motion, sense * (self._left[row] + own) + described, sense * own + described, described)
+        rows = (motion, (self._left[row] + own) / ratio + described, own / ratio + described, described)
         x, torque, law, has = (one[moving] for one in rows)
         bins = list(_bins(x, over, torques.numbers_a_sample))
 
@@ -179,6 +179,10 @@ class _Maps:
             described=means(has), law=means(law) if laws else None, spread=scatter(law) if laws else None,
             is_named=bool(laws) and all((term.word, term.site) in self._named for term, *_ in laws),
         )  # fmt: skip
+
+
+def _over(term: Term) -> Over:
+    return "velocity" if term.word in _BY_SPEED else "position"
 
 
 def _added(term: Term, values: Real, row: int) -> Real:

@@ -71,8 +71,8 @@ class Solved:
                 number.name: (float(value * gain), float(deviation * gain), number.unit)
                 for number, value, deviation in zip(term.numbers, values, deviations, strict=True)
             }
-            if term.is_coupling:
-                found = {"sense": (SENSES[str(term.variant)], 0.0, "1"), **found}
+            if term.variant in SENSES:
+                found = {"sense": (term.ratio, 0.0, "1"), **found}
         if term.form is not None:
             spread = self.spread.get((term.word, term.site, term.variant), np.inf)
             found[term.form.name] = (term.form.value, float(spread), term.form.unit)

@@ -141,7 +141,12 @@ class Term:
     @property
     def is_coupling(self) -> bool:
         """Whether it acts between two joints."""
-        return self.variant in SENSES
+        return len(self.rows) > 1
+
+    @property
+    def ratio(self) -> float:
+        """Of a coupling: by which the second joint moves what is between them, over the first."""
+        return SENSES.get(str(self.variant), self.form_value)
 
     @property
     def kind(self) -> tuple[str, str | None, int]:

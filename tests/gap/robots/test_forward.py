@@ -164,16 +164,21 @@ LAWS = {
     "encoder_offset of the drive": lambda one: changed(one, 0, drive_reading=0.05),
     "payload": lambda one: replace(one, inertial=one.inertial + np.array([np.zeros(10), POINT])),
     "gravity_tilt": lambda one: replace(one, tilt=(0.0, 0.05)),
-    "coulomb_friction sum": lambda one: replace(one, couplings=(Coupling(joints=BOTH, sense=1.0, friction=0.8),)),
+    "coulomb_friction sum": lambda one: replace(one, couplings=(Coupling(joints=BOTH, ratio=1.0, friction=0.8),)),
+    "joint_spring between": lambda one: replace(
+        one, couplings=(Coupling(joints=BOTH, ratio=1.0, stiffness=15.0, torque=4.0),)
+    ),
     "viscous_friction difference": lambda one: replace(
-        one, couplings=(Coupling(joints=BOTH, sense=-1.0, damping=0.8),)
+        one, couplings=(Coupling(joints=BOTH, ratio=-1.0, damping=0.8),)
     ),
 }
 BOTH = ("shoulder", "elbow")
 #: 0.6 kg on the axis of the forearm, 0.05 m from its origin: its inertia about that, which no number says, is small.
 POINT = np.array([0.6, 0.0, 0.0, 0.03, 0.0015, 0.0015, 0.0, 0.0, 0.0, 0.0])
 SITES = {"payload": "fore", "gravity_tilt": "world", "coulomb_friction sum": "shoulder~elbow",
-         "viscous_friction difference": "shoulder~elbow"}  # fmt: skip
+         "joint_spring between": "shoulder~elbow", "viscous_friction difference": "shoulder~elbow"}  # fmt: skip
+#: Which of a word's terms it is; the variant where it isn't a ratio.
+RATIOS = {"joint_spring between": 1.0}
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -186,7 +191,8 @@ def test_a_word_at_its_site_is_read_as_the_law_that_made_the_log(name: str, tmp_
     word, _, variant = name.partition(" ")
     found = [
         term for term in contest.terms
-        if (term.word, term.site) == (word, SITES.get(name, "shoulder")) and variant == (term.variant or "")
+        if (term.word, term.site) == (word, SITES.get(name, "shoulder"))
+        and (term.form_value == RATIOS[name] if name in RATIOS else variant == (term.variant or ""))
     ]  # fmt: skip
     read = machine_of(contest, contest.fit(found))
     for each, truth in zip(read.joints, machine.joints, strict=True):
@@ -196,12 +202,9 @@ def test_a_word_at_its_site_is_read_as_the_law_that_made_the_log(name: str, tmp_
             assert getattr(each, number) == pytest.approx(getattr(truth, number), rel=0.1, abs=size), number
     # An arm that moves in a plane hardly tells of the tilt across it.
     assert read.tilt[1] == pytest.approx(machine.tilt[1], abs=0.01)
-    assert sum(each.friction for each in read.couplings) == pytest.approx(
-        sum(each.friction for each in machine.couplings), rel=0.1
-    )
-    assert sum(each.damping for each in read.couplings) == pytest.approx(
-        sum(each.damping for each in machine.couplings), rel=0.1
-    )
+    for number in ("friction", "damping", "stiffness", "torque"):
+        shared = [sum(getattr(each, number) for each in one.couplings) for one in (read, machine)]
+        assert shared[0] == pytest.approx(shared[1], rel=0.1), number
     # The first moments, which gravity tells best.
     np.testing.assert_allclose(read.inertial[:, 1:4], machine.inertial[:, 1:4], atol=5e-3)
 
