@@ -136,8 +136,8 @@ class Mark:
 
     @property
     def recognised(self) -> bool:
-        """Whether a case without a right word was answered ``unknown``, or with a sibling of what was hidden."""
-        return self.verdict == "unknown" or self.family_is_right
+        """Whether a case outside the words was answered ``unknown``, or with what is like that which was hidden."""
+        return self.verdict == "unknown" or self.family_is_right or self.is_right
 
     @property
     def is_clear(self) -> bool:
@@ -181,8 +181,8 @@ class Mark:
         return tuple(one for one in self._true_causes if one not in self.faint_too)
 
     def _is_true(self, cause: Cause) -> bool:
-        if self.kind in STRANGE:
-            return self._is_sibling(cause)
+        if self.kind in STRANGE and self._is_sibling(cause):
+            return True
         return any(cause.fits(*one) for one in self._true_causes)
 
     def _is_sibling(self, cause: Cause) -> bool:

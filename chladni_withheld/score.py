@@ -265,9 +265,9 @@ QUESTIONS = (
              counts=_values_within("payload", 0.05), optional=True),
     Question(key="robots.push", what="a push: unknown, with its place and time", of=_hides("push", kind="outside"),
              counts=lambda one: one.told, optional=True),
-    Question(key="robots.coupled", what="joints that are coupled: unknown, with one of them",
-             of=lambda one: any(word.startswith("coupled_") for word, _ in one.hidden), counts=lambda one: one.told,
-             optional=True),
+    Question(key="robots.coupled", what="joints that are coupled: named at both, or unknown with one of them",
+             of=lambda one: any(word.startswith("coupled_") for word, _ in one.hidden),
+             counts=lambda one: one.is_right or one.told, optional=True),
 )  # fmt: skip
 
 

@@ -76,8 +76,8 @@ def longest_step_s(machine: Machine, names: Sequence[str]) -> float:
     inertia = np.diag(inertia_rms(model, np.asarray(model.qpos0, dtype=np.float64)[:, None]))
     found = _LONGEST_S
     for one in _chosen(machine, names):
-        springs = [*one.stops, *(each for each in machine.couplings if one.joint.name in each.joints)]
-        stiffness = one.gains()[0] + one.stiffness + sum(each.stiffness for each in springs)
+        stiffness = one.gains()[0] + one.stiffness + sum(each.stiffness for each in one.stops)
+        stiffness += sum(each.stiffness for each in machine.couplings if one.joint.name in each.joints)
         own = float(inertia[one.joint.dof])
         if one.transmission is not None:
             stiffness, own = max(stiffness, tooth_of(one.transmission, own)), min(own, one.transmission.inertia)

@@ -227,6 +227,14 @@ def _against(one: str, several: str, text: str, name: str) -> Callable[[Cause], 
     return told
 
 
+def _spring(cause: Cause) -> Told:
+    names: tuple[str, ...] = ("stiffness", "rest")
+    text = " a spring of {} about {}"
+    if "ratio" in cause.parameters:
+        names, text = (*names, "ratio"), f"{text} of the first position and {{}} times the second"
+    return _says("has", "have", text, *names)(cause)
+
+
 def _other(cause: Cause) -> Told:
     """Say a word that nothing else is known of by its name and its numbers."""
     names = [f"{name.replace('_', ' ')} {{}}" for name in cause.parameters]
@@ -247,7 +255,7 @@ _WORDS: Mapping[str, Callable[[Cause], Told]] = {
     "controller_gain": _says("has", "have", " {} of the believed kp and {} of the kd", "kp", "kd"),
     "encoder_offset": _says("reads", "read", " {} too much", "offset"),
     "gravity_tilt": _says("is", "are", " tilted by {} about x and {} about y", "about_x", "about_y"),
-    "joint_spring": _says("has", "have", " a spring of {} about {}", "stiffness", "rest"),
+    "joint_spring": _spring,
     "lag": _says("follows", "follow", " with a lag of {}", "time_constant"),
     "saturation": _says("gives", "give", " no more than {}", "limit"),
 }

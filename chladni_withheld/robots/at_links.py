@@ -110,10 +110,9 @@ def coupled_spring(rng: Rng, stage: Stage, _joint: int) -> Cause:
     stretch = way @ stage.quiet.link
     swing = float(np.sqrt(stage.swing[first] * stage.swing[second]))
     stiffness, rest = float(rng.uniform(0.4, 1.0)) * swing / float(stretch.std()), float(stretch.mean())
-    names = stage.name(first), stage.name(second)
-    return loaded("coupled_spring", "~".join(names), "linear", {"stiffness": stiffness},
-                   lambda _model, _data, _t, q, _v: -stiffness * (float(way @ q) - rest) * way,
-                   tuple(("coupled_spring", name) for name in names))  # fmt: skip
+    both, also = _alike("spring", stage.name(first), stage.name(second), as_word="joint_spring")
+    return loaded("coupled_spring", both, "linear", {"stiffness": stiffness},
+                   lambda _model, _data, _t, q, _v: -stiffness * (float(way @ q) - rest) * way, also)  # fmt: skip
 
 
 def coupled_friction(rng: Rng, stage: Stage, _joint: int) -> Cause:
@@ -123,7 +122,12 @@ def coupled_friction(rng: Rng, stage: Stage, _joint: int) -> Cause:
     way[first] = way[second] = 1.0
     force = share(rng, 0.3, 0.7) * float(np.sqrt(stage.swing[first] * stage.swing[second]))
     soft = 0.05 * float(np.hypot(stage.fast[first], stage.fast[second]))
-    names = stage.name(first), stage.name(second)
-    return loaded("coupled_friction", "~".join(names), "tanh", {"force": force},
-                   lambda _model, _data, _t, _q, v: -force * np.tanh(float(way @ v) / soft) * way,
-                   tuple(("coupled_friction", name) for name in names))  # fmt: skip
+    both, also = _alike("friction", stage.name(first), stage.name(second), as_word="coulomb_friction")
+    return loaded("coupled_friction", both, "tanh", {"force": force},
+                   lambda _model, _data, _t, _q, v: -force * np.tanh(float(way @ v) / soft) * way, also)  # fmt: skip
+
+
+def _alike(law: str, *names: str, as_word: str) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """The site of what two joints share, and what says the same: the word at both, and the law at either."""
+    both = "~".join(names)
+    return both, ((as_word, both), *((f"coupled_{law}", name) for name in names))

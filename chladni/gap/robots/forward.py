@@ -207,7 +207,11 @@ def _carried(values: Real) -> Real:
 
 
 #: Of what two joints share: where the numbers of a word go.
-_COUPLED = {"coulomb_friction": ("friction",), "viscous_friction": ("damping",), "joint_spring": ("stiffness", "torque")}
+_COUPLED = {
+    "coulomb_friction": ("friction",),
+    "viscous_friction": ("damping",),
+    "joint_spring": ("stiffness", "torque"),
+}
 
 Law = Callable[[MachineJoint, Term, Real, Torques], MachineJoint]
 

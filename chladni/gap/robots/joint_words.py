@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from chladni.gap.robots.motion import rms
-from chladni.gap.robots.term import SENSES, Form, Number, Term, at_row, formed, law, length, units, usual
+from chladni.gap.robots.term import Form, Number, Term, at_row, formed, law, length, units, usual
 from chladni.gap.robots.torques import Torques
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
@@ -21,8 +21,6 @@ _SLIDES, _YIELDS = (0.01, 0.03, 0.08), (0.16, 0.32, 0.64)
 ALONG_THE_WAY, PRESLIDING = "along the way", "presliding"
 #: Quantiles of a joint's way at which a stop begins.
 _STOPS = (0.6, 0.75, 0.85, 0.93)
-#: Of a spring between two joints: by which the second winds it up over the first, where a search begins.
-_RATIOS = (-1.0, 1.0)
 #: Friction that grows with the load, before a log is seen.
 _BY_LOAD = 0.3
 #: Fewest waves of a ripple that a joint passes, lines between two that can be told apart, highest peaks tried.
@@ -156,32 +154,6 @@ def _dahl(position: Real, yields: float, stretches: tuple[tuple[int, int], ...])
     return found
 
 
-def coupled(torques: Torques) -> Iterator[Term]:
-    """Friction of the sum or difference of two speeds in a wrist: its last motor drives through the joint before."""
-    robot = torques.robot
-    inner = {one for one in torques.joints for other in torques.joints if robot.is_behind(one, other)}
-    for row, (one, other) in enumerate(pairwise(torques.joints)):
-        if not (one.kind == other.kind == "hinge" and robot.is_behind(one, other)) or other in inner:
-            continue
-        often = min(usual(torques, row), usual(torques, row + 1))
-        for variant, sense in SENSES.items():
-            fast = torques.fast_velocity[row] + sense * torques.fast_velocity[row + 1]
-            smooth = torques.velocity[row] + sense * torques.velocity[row + 1]
-            sign = torques.smooth(np.tanh(fast / np.hypot(*torques.slow[row : row + 2])))
-            dry = Number(name="force", unit="N m", scale=often, least=0.0)
-            wet = Number(name="coefficient", unit="N m s/rad", scale=often / rms(smooth), least=0.0)
-            for word, column, number in (("coulomb_friction", sign, dry), ("viscous_friction", smooth, wet)):
-                yield Term(
-                    word=word, site=f"{one.name}~{other.name}", numbers=(number,),
-                    make=partial(_at_both, torques, (row, row + 1), sense, column),
-                    rows=(row, row + 1), variant=variant, rare=True,
-                )  # fmt: skip
-
-
-def _at_both(torques: Torques, rows: tuple[int, int], ratio: float, *columns: Real) -> Real:
-    return np.asarray(at_row(torques, rows[0], *columns) + ratio * at_row(torques, rows[1], *columns))
-
-
 def springs(torques: Torques) -> Iterator[Term]:
     """Springs beside a joint, and stops inside its way."""
     for row, joint in torques.rows:
@@ -193,33 +165,6 @@ def springs(torques: Torques) -> Iterator[Term]:
         yield law(torques, row, "joint_spring", partial(_line, torques.position[row]), pull, constant)
         for side in (1.0, -1.0):
             yield from _stop(torques, row, joint, side, pull)
-
-
-def springs_between(torques: Torques) -> Iterator[Term]:
-    """Springs of which two joints of a chain wind up, as a cable, a belt or an elastic band over both."""
-    for first, one in torques.rows:
-        for second, other in torques.rows:
-            if one.kind == other.kind and first != second and other.link in torques.robot.hanging(one):
-                yield from _spring_between(torques, (first, second), one, other)
-
-
-def _spring_between(torques: Torques, rows: tuple[int, int], one: RobotJoint, other: RobotJoint) -> list[Term]:
-    often = min(usual(torques, row) for row in rows)
-    force, _, stiffness = units(one)
-
-    def make(ratio: float) -> Term:
-        way = torques.position[rows[0]] + ratio * torques.position[rows[1]]
-        mean, travel = float(np.mean(way)), rms(way - np.mean(way))
-        numbers = (
-            Number(name="stiffness", unit=stiffness, scale=often / travel, least=0.0),
-            Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel)),
-        )
-        return Term(
-            word="joint_spring", site=f"{one.name}~{other.name}", numbers=numbers, rows=rows, rare=True,
-            make=lambda: _at_both(torques, rows, ratio, *_line(way)),
-        )  # fmt: skip
-
-    return formed(make, np.array(_RATIOS), name="ratio", unit="1")
 
 
 def _line(position: Real) -> tuple[Real, ...]:

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 from chladni.gap.records.diagnosis import PARAMETER
 from chladni.gap.robots.body_words import bodies, payloads, readings
+from chladni.gap.robots.coupling_words import couplings
 from chladni.gap.robots.drive_words import delays, drives
-from chladni.gap.robots.joint_words import bristles, coupled, friction, inertia, ripple, springs, springs_between
+from chladni.gap.robots.joint_words import bristles, friction, inertia, ripple, springs
 from chladni.gap.robots.term import Form, Term
 from chladni.gap.robots.torques import FormKey, Torques
 from chladni.gap.robots.transmission_words import transmissions
@@ -16,9 +17,8 @@ Maker = Callable[[Torques], Iterator[Term]]
 _LASTING: Mapping[Maker, tuple[str, ...]] = {
     friction: ("coulomb_friction", "viscous_friction", "quadratic_damping", "load_friction", "stribeck_friction",
                "hysteresis"),
-    coupled: ("coulomb_friction", "viscous_friction"),
+    couplings: ("coulomb_friction", "viscous_friction", "joint_spring"),
     springs: ("joint_spring", "one_sided_stop"),
-    springs_between: ("joint_spring",),
     inertia: ("armature",),
     transmissions: ("joint_elasticity", "backlash"),
     drives: ("gain_error", "saturation", "dead_zone", "lag", "rate_limit", "controller_gain"),
