@@ -6,12 +6,14 @@ from functools import partial
 import numpy as np
 
 from chladni.gap.robots.motion import rms
-from chladni.gap.robots.term import SENSES, Number, Term, at_row, formed, units, usual
+from chladni.gap.robots.term import Number, Term, at_row, formed, units, usual
 from chladni.gap.robots.torques import Torques
 from chladni.signals.arrays import Real
 
 #: Of a spring: by which the second joint winds it up over the first, where a search begins.
 _RATIOS = (-1.0, 1.0)
+#: Of gears: whether they turn by the sum or the difference of two speeds.
+_SENSES = {"sum": 1.0, "difference": -1.0}
 
 Rows = tuple[int, int]
 
@@ -35,11 +37,11 @@ def _friction(torques: Torques, rows: Rows) -> Iterator[Term]:
     """Friction of the sum or the difference of two speeds."""
     force, damping, _ = units(torques.joints[rows[0]])
     often = _usual(torques, rows)
-    for variant, sense in SENSES.items():
+    for variant, sense in _SENSES.items():
         smooth = _between(torques.velocity, rows, sense)
         dry = Number(name="force", unit=force, scale=often, least=0.0)
         wet = Number(name="coefficient", unit=damping, scale=often / rms(smooth), least=0.0)
-        one = partial(Term, site=_site(torques, rows), rows=rows, variant=variant, rare=True)
+        one = partial(Term, site=_site(torques, rows), rows=rows, variant=variant, rare=True, ratio=sense)
         yield one(word="coulomb_friction", numbers=(dry,), make=partial(_rubbing, torques, rows, sense))
         yield one(word="viscous_friction", numbers=(wet,), make=partial(_at, torques, rows, sense, smooth))
 
@@ -57,7 +59,7 @@ def _spring(torques: Torques, rows: Rows, ratio: float) -> Term:
     pull = Number(name="stiffness", unit=stiffness, scale=often / travel, least=0.0)
     constant = Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel))
     return Term(
-        word="joint_spring", site=_site(torques, rows), rows=rows, numbers=(pull, constant), rare=True,
+        word="joint_spring", site=_site(torques, rows), rows=rows, numbers=(pull, constant), rare=True, ratio=ratio,
         make=partial(_at, torques, rows, ratio, way, np.ones_like(way)),
     )  # fmt: skip
 

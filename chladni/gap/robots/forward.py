@@ -188,7 +188,7 @@ class _Reading:
 
     def _couplings(self) -> Iterator[Coupling]:
         for term, values in self._terms:
-            if not term.is_coupling:
+            if term.ratio is None:
                 continue
             one, _, other = term.site.partition("~")
             numbers = dict(zip(_COUPLED[term.word], values.tolist(), strict=True))

@@ -139,11 +139,11 @@ class _Maps:
 
     def _of_pair(self, term: Term) -> TorqueMap:
         """What acts on the motion of two joints together, as the outer one feels it."""
-        (inner, outer), over = term.rows, _over(term)
+        (inner, outer), over, ratio = term.rows, _over(term), term.ratio or 1.0
         motions = self._torques.velocity if over == "velocity" else self._torques.position
-        motion = motions[inner] + term.ratio * motions[outer]
+        motion = motions[inner] + ratio * motions[outer]
         laws = [one for one in self._laws if one[0].site == term.site and _over(one[0]) == over]
-        return self._map(term.site, over, outer, motion, 0.0 * motion, laws, term.ratio)
+        return self._map(term.site, over, outer, motion, 0.0 * motion, laws, ratio)
 
     def _map(
         self,

@@ -13,7 +13,7 @@ from chladni.gap.robots.forms import Forms, refined
 from chladni.gap.robots.gains import Gains, guessed_gains, unknown_gains, with_gains
 from chladni.gap.robots.pushes import PUSHED, Push, paying, price, pushed, pushes_of
 from chladni.gap.robots.search import searched
-from chladni.gap.robots.term import SENSES, Term
+from chladni.gap.robots.term import Term
 from chladni.gap.robots.told import TOLD, Numbers
 from chladni.gap.robots.tolerances import LOOP_S
 from chladni.gap.robots.torques import ALL_COMMANDS, FormKey, Guesses, Torques
@@ -71,7 +71,7 @@ class Solved:
                 number.name: (float(value * gain), float(deviation * gain), number.unit)
                 for number, value, deviation in zip(term.numbers, values, deviations, strict=True)
             }
-            if term.variant in SENSES:
+            if term.ratio is not None and term.form is None:
                 found = {"sense": (term.ratio, 0.0, "1"), **found}
         if term.form is not None:
             spread = self.spread.get((term.word, term.site, term.variant), np.inf)

@@ -12,8 +12,6 @@ from chladni.signals.arrays import Real
 
 #: Place of a form that was found, beside those of the grid that it's searched on.
 FOUND = -1
-#: Variants of laws between two joints: of the sum or the difference of their speeds.
-SENSES = {"sum": 1.0, "difference": -1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +106,8 @@ class Term:
         Whether its first number is one over a gain: what is left is in units of what was asked for.
     rare
         Whether few machines have it.
+    ratio
+        Of what acts between two joints: by which the second moves it, over the first; None of all others.
     reach
         How far the next three numbers, as a vector, can lie from the first as its arm: a mass and its first moment.
     """
@@ -124,6 +124,7 @@ class Term:
     takes: bool = False
     over_gain: bool = False
     rare: bool = False
+    ratio: float | None = None
 
     @cached_property
     def columns(self) -> Real:
@@ -141,12 +142,7 @@ class Term:
     @property
     def is_coupling(self) -> bool:
         """Whether it acts between two joints."""
-        return len(self.rows) > 1
-
-    @property
-    def ratio(self) -> float:
-        """Of a coupling: by which the second joint moves what is between them, over the first."""
-        return SENSES.get(str(self.variant), self.form_value)
+        return self.ratio is not None
 
     @property
     def kind(self) -> tuple[str, str | None, int]:
