@@ -271,12 +271,22 @@ class Torques(Motion):
     @cached_property
     def fast_asked(self) -> Real:
         """``[joint, sample]``: torque that the drives are asked for."""
-        return self._limited(np.nan_to_num(self._served)) if self.gives else self.fast_drive
+        return self._limited(self.fast_served) if self.gives else self.fast_drive
 
     @cached_property
     def asked(self) -> Real:
         """``[joint, coarse]``: torque that the loops ask for; the drives' where no efforts stand beside them."""
-        return self.smooth(self._limited(np.nan_to_num(self._served))) if self.two_sided else self.drive
+        return self.smooth(self._limited(self.fast_served)) if self.two_sided else self.drive
+
+    @cached_property
+    def fast_served(self) -> Real:
+        """``[joint, sample]``: torque that position loops would ask for without limits; zero where nobody says."""
+        return np.nan_to_num(self._served)
+
+    @cached_property
+    def over_limit(self) -> Real:
+        """``[joint, coarse]``: what limits keep of that."""
+        return self.smooth(self.fast_served - self._limited(self.fast_served))
 
     @cached_property
     def asked_of(self) -> Real:

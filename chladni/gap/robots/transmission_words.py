@@ -69,7 +69,8 @@ def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Re
     rows = tuple(dict.fromkeys([row, torques.servo_row(row)]))
     known = _loop_is_known(torques, row)
     if known:
-        numbers = (number, *numbers)
+        # A loop that yields with its motor asks for less than one whose motor stands where the link is.
+        numbers = (number, *numbers, *[PART] * bool(np.any(torques.over_limit[row])))
     if known or torques.by_effort:
         make = partial(_at_link, torques, row, ahead, loop_is_known=known)
         yield Term(word=word, site=joint.name, make=make, numbers=numbers, rows=rows, variant=AT_LINK, rare=True)
@@ -86,7 +87,9 @@ def _at_link(torques: Torques, row: int, ahead: Real, *, loop_is_known: bool) ->
         return columns
     # The loop works on the motor's angle.
     loop = torques.kp[row] * ahead + torques.kd[row] * rate
-    return np.concatenate([at_row(torques, torques.servo_row(row), loop), columns])
+    over = torques.over_limit[row]
+    beyond = [at_row(torques, torques.servo_row(row), -over)] * bool(np.any(over))
+    return np.concatenate([at_row(torques, torques.servo_row(row), loop), columns, *beyond])
 
 
 def _at_motor(torques: Torques, row: int, ahead: Real) -> Real:
@@ -97,7 +100,7 @@ def _at_motor(torques: Torques, row: int, ahead: Real) -> Real:
 
 def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
     """Play before a link that the log reads: inside it nothing holds the motor, which follows its loop."""
-    asked, kp, kd = torques.fast_asked[row], float(torques.kp[row]), float(torques.kd[row])
+    asked, kp, kd = torques.fast_served[row], float(torques.kp[row]), float(torques.kd[row])
     step_s = 1.0 / torques.log.sample_rate_hz
     rows = tuple(dict.fromkeys([row, torques.servo_row(row)]))
     rotor = _rotor(torques, row, joint)
@@ -107,7 +110,8 @@ def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
             ahead = _inside(asked, 0.5 * gap, kp, kd, step_s)
             pulled = torques.smooth(kp * ahead + kd * np.gradient(ahead, step_s))
             turning = torques.acceleration[row] + torques.coarse_rate(torques.coarse_rate(torques.smooth(ahead)))
-            return np.concatenate([at_row(torques, torques.servo_row(row), pulled), at_row(torques, row, turning)])
+            not_given = at_row(torques, torques.servo_row(row), pulled - torques.over_limit[row])
+            return np.concatenate([not_given, at_row(torques, row, turning)])
 
         return Term(
             word="backlash", site=joint.name, make=columns, numbers=(PART, rotor), rows=rows, variant=AT_LINK,
