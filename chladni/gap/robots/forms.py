@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from chladni.gap.robots.contest import Contest, Fit
-from chladni.gap.robots.search import alternatives
+from chladni.gap.robots.search import alternatives, merged
 from chladni.gap.robots.term import Form, Term
 from chladni.gap.robots.torques import FormKey
 
@@ -29,14 +29,19 @@ def refined(contest: Contest, best: Fit, before: Forms) -> tuple[Forms, Forms]:
     spread: dict[FormKey, float] = {}
     small = contest.narrowed(best.terms)
     for place, term in enumerate(best.terms):
-        rivals = [one.terms[-1] for one in alternatives(contest, best, place, _RIVALS)[1:]]
-        rest = small.narrowed([one for one in small.terms if _key(one) != _key(term)])
-        # Off its grid a rival may be better than what is best on it.
-        for rival in [*(one for one in rivals if _key(one) not in before), term]:
-            if rival.form is not None:
-                found, spread[_key(rival)] = _found(rest, best, rival.form)
-                forms[_key(rival)] = found.form_value
-                small = rest.joined(found) if rival is term else small
+        # Off its grid a rival may be better than what is best on it: in place of all at its site, or of this one.
+        for rival in [*merged(contest, best, [place]), *alternatives(contest, best, place, _RIVALS)[1:]]:
+            one = rival.terms[-1]
+            if one.form is not None and _key(one) not in forms:
+                beside = {_key(each) for each in rival.terms[:-1]}
+                rest = small.narrowed([each for each in small.terms if _key(each) in beside])
+                found, spread[_key(one)] = _found(rest, best, one.form)
+                forms[_key(one)] = found.form_value
+        if term.form is not None:
+            rest = small.narrowed([each for each in small.terms if _key(each) != _key(term)])
+            found, spread[_key(term)] = _found(rest, best, term.form)
+            forms[_key(term)] = found.form_value
+            small = rest.joined(found)
     return forms, spread
 
 

@@ -257,14 +257,12 @@ def _transmission(one: MachineJoint, term: Term, values: Real, torques: Torques)
     gives = found[first] if first in found else found["both"] / rotor if rotor else 0.0
     # A motor without a rotor can't be run.
     rotor = max(rotor, LEAST_ROTOR * float(torques.need.inertia[one.joint.dof, one.joint.dof]))
-    stiffness = np.inf if first == "gap" or gives <= 0 else 1.0 / gives
-    return replace(
-        one,
-        transmission=Transmission(
-            stiffness=stiffness, gap=max(gives, 0.0) if first == "gap" else 0.0, inertia=rotor,
-            logs_motor=term.variant == AT_MOTOR,
-        ),
+    yields = max(found.get("compliance", 0.0) if first == "gap" else gives, 0.0)
+    made = Transmission(
+        stiffness=1.0 / yields if yields else np.inf, gap=max(gives, 0.0) if first == "gap" else 0.0, inertia=rotor,
+        logs_motor=term.variant == AT_MOTOR,
     )  # fmt: skip
+    return replace(one, transmission=made)
 
 
 def _offset(one: MachineJoint, term: Term, values: Real, _torques: Torques) -> MachineJoint:

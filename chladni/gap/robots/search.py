@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 
 from chladni.gap.robots.contest import Contest, Fit
-from chladni.gap.robots.term import Term
+from chladni.gap.robots.term import FOUND, Term
 
 #: Nats that a term would bring at about, and the term.
 Promise = tuple[float, Term]
@@ -61,10 +61,14 @@ def _beside(contest: Contest, one: Fit) -> list[Fit]:
 
 
 def _each(promised: Iterable[Promise]) -> list[Promise]:
-    """Give of each law the form alone that promises most, and what it promises."""
-    found: dict[tuple[str, str, str | None], Promise] = {}
+    """Give of each law the form of its grid that promises most, and what it promises; and the one that was found.
+
+    A promise knows no bounds, which the form that was found may keep better.
+    """
+    found: dict[tuple[str, str, str | None, bool], Promise] = {}
     for nats, term in promised:
-        found.setdefault((*term.key, term.variant), (nats, term))
+        is_found = term.form is not None and term.form.place == FOUND
+        found.setdefault((*term.key, term.variant, is_found), (nats, term))
     return list(found.values())
 
 
@@ -94,7 +98,7 @@ def _tidied(contest: Contest, best: Fit, rows: frozenset[int] | None = None) -> 
     while True:
         tried = [place for place, term in enumerate(best.terms) if rows is None or rows & contest.rows(term)]
         found = [one for place in tried for one in alternatives(contest, best, place, _EXCHANGED, _BEHIND)]
-        better = _best([best, *found, *_merged(contest, best, tried), *_exchanged(contest, best, tried)])
+        better = _best([best, *found, *merged(contest, best, tried), *_exchanged(contest, best, tried)])
         if better is best:
             return best
         if rows is not None:
@@ -116,8 +120,14 @@ def _in_place(
     return list(found.values())
 
 
-def _merged(contest: Contest, best: Fit, tried: Sequence[int]) -> list[Fit]:
-    """Fit one term in place of all that stand at a site: two idealisations may be one other law."""
+def merged(contest: Contest, best: Fit, tried: Iterable[int]) -> list[Fit]:
+    """Fit one term in place of all that stand at a site: two idealisations may be one other law.
+
+    Parameters
+    ----------
+    tried
+        Places of terms, at whose sites that is tried.
+    """
     found = []
     sites = {best.terms[place].site for place in tried}
     for site, count in Counter(term.site for term in best.terms).items():
@@ -168,8 +178,10 @@ def alternatives(contest: Contest, best: Fit, place: int, count: int, behind: fl
         least = next(nats for nats, term in promised if term is own) - behind
         return [(nats, term) for nats, term in _free(taken, promised) if term is not own and nats > least]
 
-    others = _in_place(contest, without, best, count, near)
-    return [without, *(contest.fit([*rest, term], best) for term in others)]
+    others = [contest.fit([*rest, term], best) for term in _in_place(contest, without, best, count, near)]
+    # Two forms of a law are one rival.
+    of_laws = {(*one.terms[-1].key, one.terms[-1].variant): one for one in sorted(others, key=lambda one: one.nats)}
+    return [without, *(one for one in others if one in of_laws.values())]
 
 
 def _at(sites: Collection[str], promised: Iterable[Promise]) -> list[Promise]:

@@ -67,8 +67,8 @@ def _between(term: Term, values: Real, deviations: Real) -> Numbers:
         both, rotor = (float(values[by_name[name]]) for name in ("both", "inertia"))
         spread = float(deviations[by_name["both"]])
         told[first] = (both / rotor if rotor else 0.0, spread / rotor if rotor else np.inf, _SOFT[term.word])
-    if first == "compliance":
-        value, spread, unit = told.pop(first)
+    value, spread, unit = told.pop("compliance", (0.0, 0.0, ""))
+    if value > 0 or first == "compliance":
         stiffness = 1.0 / value if value > 0 else np.inf
         told["stiffness"] = (stiffness, spread * stiffness**2, "N/m" if unit == "m/N" else "N m/rad")
     return dict(sorted(told.items(), reverse=True))

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from chladni.gap.robots.motion import rms
-from chladni.gap.robots.term import PART, Number, Term, at_row, formed, length, usual
+from chladni.gap.robots.term import INSIDE, PART, Number, Term, at_row, formed, length, usual
 from chladni.gap.robots.torques import Torques
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
@@ -20,8 +20,6 @@ from chladni.signals.arrays import Real
 _GIVES = 0.03
 #: Of its link's inertia: less of a rotor isn't felt.
 LEAST_ROTOR = 0.05
-#: Quantiles of the angle by which a loop is pulled aside at which play is tried.
-_PLAYS = (0.3, 0.5, 0.75)
 AT_LINK, AT_MOTOR = "encoder at the link", "encoder at the motor"
 
 
@@ -42,7 +40,7 @@ def transmissions(torques: Torques) -> Iterator[Term]:
             if term.variant == AT_MOTOR or not known:
                 yield term
         if known:
-            yield from _play(torques, row, joint)
+            yield from _play(torques, row, joint, passed, soft)
 
 
 def _loop_is_known(torques: Torques, row: int) -> bool:
@@ -85,11 +83,15 @@ def _at_link(torques: Torques, row: int, ahead: Real, *, loop_is_known: bool) ->
     columns = at_row(torques, row, torques.acceleration[row], torques.coarse_rate(rate))
     if not loop_is_known:
         return columns
-    # The loop works on the motor's angle.
-    loop = torques.kp[row] * ahead + torques.kd[row] * rate
+    loop = _at_loop(torques, row, ahead)
     over = torques.over_limit[row]
     beyond = [at_row(torques, torques.servo_row(row), -over)] * bool(np.any(over))
     return np.concatenate([at_row(torques, torques.servo_row(row), loop), columns, *beyond])
+
+
+def _at_loop(torques: Torques, row: int, ahead: Real) -> Real:
+    """Torque that a loop asks for less, as it works on the motor's angle."""
+    return np.asarray(torques.kp[row] * ahead + torques.kd[row] * torques.coarse_rate(ahead))
 
 
 def _at_motor(torques: Torques, row: int, ahead: Real) -> Real:
@@ -98,8 +100,11 @@ def _at_motor(torques: Torques, row: int, ahead: Real) -> Real:
     return np.concatenate([behind[None], at_row(torques, row, torques.acceleration[row])[:, : len(behind)]])
 
 
-def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
-    """Play before a link that the log reads: inside it nothing holds the motor, which follows its loop."""
+def _play(torques: Torques, row: int, joint: RobotJoint, passed: Real, soft: Number) -> Iterator[Term]:
+    """Play before a link that the log reads: inside it nothing holds the motor, which follows its loop.
+
+    Its teeth yield to what they pass on.
+    """
     asked, kp, kd = torques.fast_served[row], float(torques.kp[row]), float(torques.kd[row])
     step_s = 1.0 / torques.log.sample_rate_hz
     rows = tuple(dict.fromkeys([row, torques.servo_row(row)]))
@@ -110,15 +115,16 @@ def _play(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
             ahead = _inside(asked, 0.5 * gap, kp, kd, step_s)
             pulled = torques.smooth(kp * ahead + kd * np.gradient(ahead, step_s))
             turning = torques.acceleration[row] + torques.coarse_rate(torques.coarse_rate(torques.smooth(ahead)))
-            not_given = at_row(torques, torques.servo_row(row), pulled - torques.over_limit[row])
-            return np.concatenate([not_given, at_row(torques, row, turning)])
+            loop = pulled - torques.over_limit[row], _at_loop(torques, row, passed)
+            given, teeth = at_row(torques, torques.servo_row(row), *loop)[:, None]
+            return np.concatenate([given, at_row(torques, row, turning), teeth])
 
         return Term(
-            word="backlash", site=joint.name, make=columns, numbers=(PART, rotor), rows=rows, variant=AT_LINK,
+            word="backlash", site=joint.name, make=columns, numbers=(PART, rotor, soft), rows=rows, variant=AT_LINK,
             takes=True, rare=True,
         )  # fmt: skip
 
-    grid = 2.0 * np.quantile(np.abs(asked), _PLAYS) / kp
+    grid = 2.0 * np.quantile(np.abs(asked), INSIDE) / kp
     if grid[0] > 0 and np.all(np.diff(grid) > 0):
         yield from formed(make, grid, name="gap", unit=length(joint), scale=_GIVES)
 
