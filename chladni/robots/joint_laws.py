@@ -129,18 +129,32 @@ class Between:
         """Whether there's one."""
         return bool(self.soft.any())
 
-    def start(self, reading: Real, velocity: Real, forward: Real, kp: Real) -> Real:
-        """Begin where the log reads, with the drive's torque in balance; give the links' positions."""
-        half = 0.5 * self.gap
+    def start(
+        self, reading: Real, velocity: Real, torque: Real, kp: Real, passed: Real, rate: Real
+    ) -> tuple[Real, Real]:
+        """Begin where the log reads; give the links' positions and speeds.
+
+        Springs are wound up by what they pass to their links; what has play begins with its loop in balance.
+
+        Parameters
+        ----------
+        torque
+            That loops would ask for if motors were where the log reads.
+        passed, rate
+            That reaches the links, and its rate.
+        """
+        half, plays = 0.5 * self.gap, self.gap > 0.0
         stiffness = np.where(self.soft, self.stiffness, 1.0)
         # kp (command - motor) = stiffness (lead - half the play), from either side that the log reads.
-        torque = forward - kp * reading
         by_link = (np.abs(torque) + stiffness * half) / (kp + stiffness)
         lead = np.where(self.at_motor, half + np.abs(torque) / stiffness, np.maximum(by_link, 0.0))
-        lead = np.where(self.soft, np.sign(torque) * lead, 0.0)
-        link = np.where(self.at_motor, reading - lead, reading)
-        self.angle, self.speed = link + lead, velocity.copy()
-        return np.asarray(link)
+        lead = np.where(plays, np.sign(torque) * lead, np.where(self.soft, passed / stiffness, 0.0))
+        leading = np.where(self.soft & ~plays, rate / stiffness, 0.0)
+        link, speed = (
+            np.where(self.at_motor, read - ahead, read) for read, ahead in ((reading, lead), (velocity, leading))
+        )
+        self.angle, self.speed = link + lead, speed + leading
+        return link, speed
 
     def motor(self, position: Real, velocity: Real) -> tuple[Real, Real]:
         """Angle and speed that the loops work on."""

@@ -50,6 +50,9 @@ class Driven:
         Of each joint: what is asked of it.
     position, velocity
         ``[joint, run]``: as the log reads them where each run starts.
+    passed
+        ``[2, joint, run]``: torque that moves the links where each run starts, and its rate; None at rest, where it's
+        what the drives give.
     steps
         ``[run]``: how many each lasts, a multiple of `every`.
     every
@@ -68,6 +71,7 @@ class Driven:
     every: int
     step_s: float
     base: BaseMotion | None = None
+    passed: Real | None = None
 
 
 def longest_step_s(machine: Machine, names: Sequence[str]) -> float:
@@ -280,7 +284,7 @@ class _Run:
         """Run all."""
         driven, found = self._driven, []
         for place, span in enumerate(self._spans()):
-            self._start(driven.position[:, place], driven.velocity[:, place], self._forward[:, span.start])
+            self._start(place, self._forward[:, span.start])
             path = self._path(span)[:: driven.every]
             path[np.logical_or.accumulate(~np.isfinite(path).all(axis=1))] = np.inf
             found.append(path)
@@ -290,11 +294,14 @@ class _Run:
         diagonal = np.diag(inertia_rms(self._model, np.asarray(self._model.qpos0, dtype=np.float64)[:, None]))
         return diagonal[[one.joint.dof for one in self._joints]]
 
-    def _start(self, position: Real, velocity: Real, ahead: Real) -> None:
+    def _start(self, place: int, ahead: Real) -> None:
         self._mujoco.mj_resetData(self._model, self._data)
-        truth = position - self._row("reading")
-        self._data.qpos[self._places] = self._between.start(truth, velocity, ahead, self._kp)
-        self._data.qvel[self._dofs] = velocity
+        driven = self._driven
+        truth = driven.position[:, place] - self._row("reading")
+        torque = ahead - self._kp * truth
+        passed, rate = (torque, 0.0 * torque) if driven.passed is None else driven.passed[..., place]
+        link, speed = self._between.start(truth, driven.velocity[:, place], torque, self._kp, passed, rate)
+        self._data.qpos[self._places], self._data.qvel[self._dofs] = link, speed
 
     def _path(self, span: slice) -> Real:
         """Step through a run; ``[step, joint]``, NaN from where it goes astray."""

@@ -256,7 +256,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
         *(
             one
             for one in found[1:]
-            if not one.terms[-1].holds(term) or (_needs_more(one) and one.nats > best.nats - TEMPER)
+            if not one.terms[-1].holds(term) or (_adds(solved, one, -1) and one.nats > best.nats - TEMPER)
         ),
     ]
     # What is unknown elsewhere is so with the term, too.
@@ -265,27 +265,28 @@ def _weighed(solved: Solved, place: int) -> Weighed:
     nats = np.array([best.nats, rest.nats, unknown, *(one.nats for one in others[1:])])
     weight = np.exp((nats - nats.max()) / TEMPER)
     # The same word at sites that the log can't tell from this one is no doubt of the word.
+    candidate = _candidate(solved, place)
+    words = {term.word, candidate.effect}
     near = [one.terms[-1] for one in others[1:] if one.nats > best.nats - CLOSE]
     same = sum(
         float(part)
         for one, part in zip(others[1:], weight[3:], strict=True)
-        if one.terms[-1].word == term.word and one.terms[-1] in near
+        if one.terms[-1].word in words and one.terms[-1] in near
     )
     lost = np.array([one.energy for one in rest.left]) - np.array([one.energy for one in best.left])
     # What tolerances take over when they're stretched is felt, too.
     strained = rest.strain - best.strain
     shares = contest.shares(best, place)
     acts = np.flatnonzero(shares > _ACTS * np.max(shares))
-    candidate = _candidate(solved, place)
     return Weighed(
         term=term,
         candidate=candidate,
         probability=(1.0 - LAPSE) * (float(weight[0]) + same) / float(np.sum(weight)),
         share=float(min(np.max(shares), 1.0)),
         acts=tuple(int(row) for row in (term.rows or acts)),
-        group=tuple(dict.fromkeys([candidate.site, *(one.site for one in near if one.word == term.word)])),
+        group=tuple(dict.fromkeys([candidate.site, *(one.site for one in near if one.word in words)])),
         others=tuple(
-            dict.fromkeys(Candidate(effect=one.word, site=one.site) for one in near if one.word != term.word)
+            dict.fromkeys(Candidate(effect=one.word, site=one.site) for one in near if one.word not in words)
         ),
         parameters=_parameters(solved, place, candidate),
         is_told=bool(np.any(_told(best, place))),
@@ -295,9 +296,13 @@ def _weighed(solved: Solved, place: int) -> Weighed:
     )
 
 
-def _needs_more(fit: Fit) -> bool:
-    """Whether the last number of the last law is told, without which it'd be a simpler one."""
-    return bool(_told(fit, len(fit.terms) - 1)[-1])
+def _adds(solved: Solved, fit: Fit, place: int) -> bool:
+    """Whether what a law of a fit has beyond a plainer one is told."""
+    term = fit.terms[place]
+    if term.form is None or not term.adds_form:
+        return bool(_told(fit, place % len(fit.terms))[-1])
+    spread = solved.spread.get((term.word, term.site, term.variant), term.form.high - term.form.low)
+    return term.form.value > _SIGMAS * spread
 
 
 def _told(best: Fit, place: int) -> Mask:
@@ -315,11 +320,11 @@ def _told(best: Fit, place: int) -> Mask:
 def _candidate(solved: Solved, place: int) -> Candidate:
     """What a term is called.
 
-    A law whose last number isn't told is called as the one without; less friction, damping or armature than the
-    description has is a wrong value of it.
+    A law whose last number (or form) isn't told is called as the one without; less friction, damping or armature than
+    the description has is a wrong value of it.
     """
     term = solved.best.terms[place]
-    word = term.word if term.plainer is None or _told(solved.best, place)[-1] else term.plainer
+    word = term.word if term.plainer is None or _adds(solved, solved.best, place) else term.plainer
     if word in _STATED and not term.is_coupling and solved.best.values(place)[0][0] < term.nominal[0]:
         return Candidate(effect=PARAMETER, site=f"{term.site}.{_STATED[word]}")
     return Candidate(effect=word, site=term.site)
@@ -332,7 +337,9 @@ def _parameters(solved: Solved, place: int, candidate: Candidate) -> dict[str, F
         mass = float(inertial_numbers(solved.torques.robot)[link, 0])
         ((value, deviation, unit),) = numbers.values()
         return {"value": FittedNumber(value=mass * (1.0 + value), std=mass * deviation, unit=unit, nominal=mass)}
-    if candidate.effect == term.plainer or candidate.effect == PARAMETER:
+    if candidate.effect == term.plainer and term.form is not None and term.adds_form:
+        numbers.pop(term.form.name)
+    elif candidate.effect == term.plainer or candidate.effect == PARAMETER:
         numbers = {term.numbers[0].name: numbers[term.numbers[0].name]}
     nominal = float(term.nominal[0]) if {candidate.effect, term.word} & _STATED.keys() else None
     told = {

@@ -364,6 +364,7 @@ def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -
         step_s=step_s,
         position=torques.fast_position[:, starts], velocity=torques.fast_velocity[:, starts],
         steps=np.array([one.size for one in at_s]), base=_base(machine, torques, np.concatenate(at_s)),
+        passed=torques.passed_at(log.time_s[starts]),
     )  # fmt: skip
     found = np.full_like(log.position, np.nan)
     found[:, np.concatenate(samples)] = run(machine, names, driven)

@@ -286,8 +286,11 @@ def _predicted(fit: Fit, here: Sequence[Term], laid: Torques) -> Real:
     """``[row, coarse]``: what a set of terms says is missing."""
     found = np.zeros_like(laid.missing)
     for place, term in enumerate(fit.terms):
-        values, _ = fit.values(place)
-        part = np.tensordot(values - term.nominal, _like(here, term).columns, 1)
+        told = dict(zip((one.name for one in term.numbers), fit.values(place)[0].tolist(), strict=True))
+        # Where a motion asks for less than a limit a law has no part beyond it.
+        like = _like(here, term)
+        numbers = np.array([told.get(one.name, one.about) - one.nominal for one in like.numbers])
+        part = np.tensordot(numbers, like.columns, 1)
         found[: len(part)] += part
     return found
 

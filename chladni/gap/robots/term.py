@@ -103,6 +103,8 @@ class Term:
         The number that its columns aren't linear in, if there's one.
     plainer
         The word of the law that is left without the last number; None where none is.
+    adds_form
+        Whether it's the form that the plainer law lacks, in place of the last number.
     takes
         Whether its first column is torque that a drive was asked for and doesn't give.
     over_gain
@@ -124,6 +126,7 @@ class Term:
     form: Form | None = None
     reach: float | None = None
     plainer: str | None = None
+    adds_form: bool = False
     takes: bool = False
     over_gain: bool = False
     rare: bool = False

@@ -330,6 +330,12 @@ class Torques(Motion):
         friction = np.array([one.friction for one in self.joints])[:, None]
         return self.of_joints(self.need.torque) + friction * self.sign
 
+    def passed_at(self, time_s: Real) -> Real:
+        """Give ``[2, joint, time]``: torque that moves the links at times of the log, and its rate."""
+        at = self.log.time_s[self.kept]
+        both = self.wanted, [self.coarse_rate(row) for row in self.wanted]
+        return np.array([[np.interp(time_s, at, row) for row in rows] for rows in both])
+
     @cached_property
     def missing(self) -> Real:
         """``[row, coarse]``: what the drives gave beyond what the motion and the described friction needed.

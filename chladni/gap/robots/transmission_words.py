@@ -121,7 +121,7 @@ def _play(torques: Torques, row: int, joint: RobotJoint, passed: Real, soft: Num
 
         return Term(
             word="backlash", site=joint.name, make=columns, numbers=(PART, rotor, soft), rows=rows, variant=AT_LINK,
-            takes=True, rare=True,
+            takes=True, rare=True, plainer="joint_elasticity", adds_form=True,
         )  # fmt: skip
 
     grid = 2.0 * np.quantile(np.abs(asked), INSIDE) / kp
