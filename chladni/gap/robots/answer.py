@@ -89,7 +89,7 @@ class Answer:
         """What simulation confirms least, as ``word@site``: others that fit those torques may follow the motion."""
         if not self._suggested or self._simulated is None or self.is_confirmed():
             return frozenset()
-        left = _without_worst(self._suggested, self._simulated, self.solved.torques)
+        left = _without_worst(self._suggested, self._simulated)
         return frozenset(f"{one.term.word}@{one.term.site}" for one in self._suggested if one not in left)
 
     def is_confirmed(self) -> bool:
@@ -104,10 +104,7 @@ class Answer:
 
     @cached_property
     def _confirmed(self) -> tuple[tuple["Weighed", ...], Confirmed | None, Confirmed | None]:
-        """The names with which positions are simulated no worse than without, that simulation, and any run.
-
-        What acts where the error grew most goes first, the least probable before others.
-        """
+        """The names with which positions are simulated no worse than without, that simulation, and any run."""
         named, first = self._suggested, None
         while True:
             best = self._contest.fit([one.term for one in named])
@@ -117,9 +114,10 @@ class Answer:
             first = first or found
             if not named:
                 return (), first, first
-            if not found.denies:
+            kept = _without_worst(named, found) if found.denies else _without_worse(named, found)
+            if kept == named:
                 return named, found, found
-            named = _without_worst(named, found, self.solved.torques)
+            named = kept
 
     @cached_property
     def _suggested(self) -> tuple["Weighed", ...]:
@@ -192,11 +190,19 @@ class Answer:
         )
 
 
-def _without_worst(named: tuple["Weighed", ...], found: Confirmed, torques: Torques) -> tuple["Weighed", ...]:
+def _without_worst(named: tuple["Weighed", ...], found: Confirmed) -> tuple["Weighed", ...]:
+    """Leave out what acts where the error grew most, the least probable before others."""
     grew = found.per_joint_after**2 - found.per_joint_tuned**2
     worst = int(np.nanargmax(np.where(np.isfinite(grew), grew, np.nan)))
-    there = [one for one in named if worst in {row % len(torques.joints) for row in one.acts}] or list(named)
+    there = [one for one in named if worst in one.joints(found)] or list(named)
     return tuple(one for one in named if one is not there[-1])
+
+
+def _without_worse(named: tuple["Weighed", ...], found: Confirmed) -> tuple["Weighed", ...]:
+    """Leave out the least probable law of a joint that it makes worse, though the robot as a whole isn't."""
+    worse = set(np.flatnonzero(found.worse).tolist())
+    laws = [one for one in named if one.term.rows and one.joints(found) & worse]
+    return tuple(one for one in named if not laws or one is not laws[-1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -229,6 +235,10 @@ class Weighed:
     is_felt: bool
     nats: float
     gain: float
+
+    def joints(self, found: Confirmed) -> set[int]:
+        """Rows of the joints at which it acts, whether at their motion or at their loops."""
+        return {row % len(found.joints) for row in self.acts}
 
     @property
     def cause(self) -> Cause:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from chladni.gap.calibration import SAME
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.joint_words import ALONG_THE_WAY, way_of
 from chladni.gap.robots.solved import Solved
@@ -85,6 +86,11 @@ class Confirmed:
     def denies(self) -> bool:
         """Whether positions come out worse with what was found than without it, or not at all."""
         return self.after > self.tuned or self.after > 1.0
+
+    @property
+    def worse(self) -> Mask:
+        """``[joint]``: whether its position comes out clearly worse with what was found than without it."""
+        return np.asarray(self.per_joint_after > SAME * self.per_joint_tuned)
 
 
 def machine_of(contest: Contest, fit: Fit) -> Machine:
