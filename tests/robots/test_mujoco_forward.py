@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lsim
 
 from chladni.robots.loading import load_robot
-from chladni.robots.machine import Coupling, Machine, about_centre, as_described, physical
+from chladni.robots.machine import Coupling, Machine, Transmission, about_centre, as_described, physical
 from chladni.robots.robot import Servo
 
 pytest.importorskip("mujoco")
@@ -17,6 +17,8 @@ from chladni.robots.mujoco_forward import Driven, longest_step_s, model_of, run
 
 INERTIA, STEP_S, STEPS = 0.04, 1e-4, 5000
 AT_S = np.arange(STEPS) * STEP_S
+#: Of critical: what damps every spring between motor and link.
+TEETH_DAMPED = 0.05
 
 _ROTOR = (
     '<body name="{0}_link"><joint name="{0}" axis="0 0 1"/>'
@@ -182,6 +184,27 @@ def test_a_spring_between_two_joints_turns_them_against_each_other(rotors: Machi
     stretched = rest + 2.0 / turns * np.sin(turns * AT_S) - rest * np.cos(turns * AT_S)
     np.testing.assert_allclose(found[0] + ratio * found[1], stretched, atol=2e-3)
     np.testing.assert_allclose(ratio * found[0] - found[1], 2.0 * ratio * AT_S, atol=1e-6)
+
+
+@pytest.mark.parametrize("logs_motor", [False, True])
+def test_a_run_begins_with_its_springs_wound_up_by_what_moves_the_links(rotors: Machine, logs_motor: bool) -> None:
+    stiffness, rotor, passed, rate = 8.0, 0.3 * INERTIA, 0.4, 6.0
+    between = Transmission(stiffness=stiffness, gap=0.0, inertia=rotor, logs_motor=logs_motor)
+    driven = Driven(
+        asked=np.zeros((2, STEPS)), kind=("effort", "effort"), position=np.zeros((2, 1)),
+        velocity=np.array([[1.5], [0.0]]), passed=np.array([[[passed], [0.0]], [[rate], [0.0]]]),
+        steps=np.array([STEPS]), every=1, step_s=STEP_S,
+    )  # fmt: skip
+    found = run(with_first(rotors, transmission=between), ("one", "two"), driven)[0]
+    # Motor and link swing against each other about their centre, which goes on.
+    turns = np.sqrt(stiffness * (1.0 / INERTIA + 1.0 / rotor))
+    damped = turns * np.sqrt(1.0 - TEETH_DAMPED**2)
+    wound, winding = passed / stiffness, rate / stiffness
+    swing = np.cos(damped * AT_S) * wound + np.sin(damped * AT_S) * (winding + TEETH_DAMPED * turns * wound) / damped
+    lead = swing * np.exp(-TEETH_DAMPED * turns * AT_S)
+    part = INERTIA / (INERTIA + rotor) if logs_motor else -rotor / (INERTIA + rotor)
+    expected = 1.5 * AT_S + part * (lead - wound) - part * winding * AT_S
+    np.testing.assert_allclose(found, expected, atol=5e-3)
 
 
 def test_coupled_coulomb_friction_brings_the_sum_to_rest_and_holds_it(rotors: Machine) -> None:

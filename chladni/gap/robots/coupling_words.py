@@ -11,7 +11,7 @@ from chladni.gap.robots.torques import Torques
 from chladni.signals.arrays import Real
 
 #: Of a spring: by which the second joint winds it up over the first, where a search begins.
-_RATIOS = (-1.0, 1.0)
+_RATIOS = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
 #: Of gears: whether they turn by the sum or the difference of two speeds.
 _SENSES = {"sum": 1.0, "difference": -1.0}
 

@@ -1,12 +1,15 @@
 """Laws with a number that isn't linear: made by the engine that runs machines, with encoders of 16 bit."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from chladni.gap.robots.contest import Contest
 from chladni.gap.robots.diagnose import diagnose_robot
-from chladni.robots.machine import Loop, Machine, Ripple, Stop, Transmission, Uneven, as_described
+from chladni.gap.robots.torques import torques_of
+from chladni.robots.machine import Coupling, Loop, Machine, Ripple, Stop, Transmission, Uneven, as_described
 from chladni.viewers.gap_summary import headline
 from tests.robots.machines import RATE_HZ, arm, changed, commands, course, joint_log_of
 
@@ -59,6 +62,39 @@ def test_elasticity_is_told_where_the_log_reads_the_motor(tmp_path: Path) -> Non
     found = diagnose_robot(robot, joint_log_of(robot, read(machine, command), command=command))
     assert [(one.effect, one.site) for one in found.causes] == [("joint_elasticity", "shoulder")]
     assert found.causes[0].parameters["stiffness"].value == pytest.approx(400.0, rel=0.15)
+
+
+def test_a_loop_that_yields_with_its_motor_is_held_to_no_limit(tmp_path: Path) -> None:
+    # Where the link is, its loop would ask for twice as much as the drive can give, and as the motor was ever asked.
+    robot, command = arm(tmp_path), commands(SECONDS)
+    position = read(changed(as_described(robot), 0, transmission=motor(stiffness=100.0)), command)
+    log = joint_log_of(robot, position, command=command)
+    free = torques_of(robot, log)
+    shoulder = robot.joints[0]
+    assert shoulder.servo is not None
+    limit = 1.1 * float(np.max(np.abs(free.wanted[0])))
+    assert np.max(np.abs(free.fast_served[0])) > 2.0 * limit
+    limited = replace(shoulder, servo=replace(shoulder.servo, limit=limit))
+    torques = torques_of(replace(robot, joints=(limited, *robot.joints[1:])), log)
+    contest = Contest(torques)
+    (spring,) = (
+        one for one in contest.terms
+        if (one.word, one.site, one.variant) == ("joint_elasticity", "shoulder", "encoder at the link")
+    )  # fmt: skip
+    fit = contest.fit([spring])
+    assert fit.left[0].over_noise < 1.0
+    assert 1.0 / fit.values(0)[0][0] == pytest.approx(100.0, rel=0.1)
+
+
+def test_a_spring_over_two_joints_is_told_at_both(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(SECONDS)
+    cable = Coupling(joints=("shoulder", "elbow"), ratio=0.7, stiffness=25.0, torque=2.0)
+    position = read(replace(as_described(robot), couplings=(cable,)), command)
+    found = diagnose_robot(robot, joint_log_of(robot, position, command=command))
+    assert [(one.effect, one.site) for one in found.causes] == [("joint_spring", "shoulder~elbow")]
+    for name, value in (("stiffness", 25.0), ("ratio", 0.7), ("rest", -2.0 / 25.0)):
+        assert found.causes[0].parameters[name].value == pytest.approx(value, rel=0.05)
+    assert "shoulder with elbow has a spring of 25." in headline(found)
 
 
 def test_friction_that_changes_along_the_way_is_told_at_its_ends(tmp_path: Path) -> None:

@@ -265,6 +265,22 @@ def test_what_says_the_same_is_right():
     assert not mark("x", truth, answer(("parameter", "elbow.mass", {}))).all_found()
 
 
+@pytest.mark.parametrize(("said", "right"), [
+    (answer(("joint_spring", "knee~hip", {})), True),
+    (answer(("joint_spring", "knee", {})), False),
+    (answer(("backlash", "hip", {})), False),
+    (answer(verdict="unknown", where={"sites": [{"name": "knee", "share": 0.8}]}), True),
+])  # fmt: skip
+def test_what_two_joints_share_is_named_at_both_or_unknown_at_one(said, right):
+    truth = {"kind": "outside", "ratio": 9.0, "effects": [
+        {"effect": "coupled_spring", "site": "hip~knee",
+         "also": [{"effect": "joint_spring", "site": "hip~knee"}, {"effect": "coupled_spring", "site": "knee"}]}
+    ]}  # fmt: skip
+    one = mark("x", truth, said)
+    assert one.wrongly_named(0.9) is not right
+    assert scored([one])["robots"]["coupled"]["right"] == int(right)
+
+
 def test_numbers_of_causes_are_held_against_the_truth():
     joints = [{"effect": "coulomb_friction", "site": f"j{k}", "parameters": {"force": 2.0}, "severity_tuned": clear}
               for k, clear in enumerate((9.0, 9.0, 9.0, 1.0))]  # fmt: skip
