@@ -69,7 +69,7 @@ def emps(tmp_path: Path, shared_data: Path, *, mass: str = "95.0", scale: Sequen
 @pytest.mark.parametrize(
     ("scale", "times"),
     [
-        ((1e3, 1.0), "0.0014"),
+        pytest.param((1e3, 1.0), "0.0014", marks=pytest.mark.nightly),
         pytest.param((1.0, 1e3), "1400", marks=pytest.mark.nightly),
         pytest.param((1.0, 1e-3), "0.0014", marks=pytest.mark.nightly),
     ],

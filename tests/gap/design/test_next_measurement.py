@@ -103,6 +103,7 @@ def test_the_sentence_names_what_to_do_and_numbers(hardening_or_stiffer):
     assert level == pytest.approx(2 * np.sqrt(np.mean(log.inputs**2)), rel=0.01)
 
 
+@pytest.mark.nightly
 def test_the_same_seed_says_the_same(hammer_or_sensor):
     assert next_measurement(*hammer_or_sensor, seed=3) == next_measurement(*hammer_or_sensor, seed=3)
 
@@ -126,7 +127,7 @@ def test_candidates_that_nothing_tells_apart_are_said_to_be_one(hammer_or_sensor
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_clock_that_is_late_before_a_law_is_compared_too():
     late = attached("time_offset", "a1", {"offset": 2e-3})
     both = hypothesis_of(

@@ -135,7 +135,7 @@ def test_noise_alone_names_nothing(colour: float) -> None:
     assert found.gap.tuned == pytest.approx(found.gap.noise, rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @among_few()
 def test_a_stiffness_far_outside_its_tolerance_is_a_parameter(out: frozenset[str]) -> None:
     found = diagnose(arm(), [measured(off={"elbow.stiffness": 1.5}, seed=6, seconds=4.0)], leave_out=out)

@@ -12,14 +12,22 @@ from chladni.gap.plant.tunable import Tunables
 from tests.gap.made_log import WORDS, band_noise, measured, three_bodies
 
 
-def test_a_limit_whose_knee_is_neither_sharp_nor_a_tanh_is_a_rounded_saturation():
+@pytest.mark.parametrize(
+    "words",
+    [
+        [one for one in WORDS if one.name in ("saturation", "gain_error", "delay")],
+        pytest.param(WORDS, marks=pytest.mark.nightly),
+    ],
+    ids=["few", "catalogue"],
+)
+def test_a_limit_whose_knee_is_neither_sharp_nor_a_tanh_is_a_rounded_saturation(words):
     model, command, limit = three_bodies(), band_noise(3000), 90.0
     # Rapp's law of amplifiers (1991), whose knee lies between those of a clip and of a tanh.
     acts = command / (1.0 + np.abs(command / limit) ** 5) ** (1 / 5)
     log, floor = measured(model, acts, noise=0.005)
     log = replace(log, inputs=command)
     location = locate(model, log, floor, Tunables.of(model))
-    forms = [one for one in screened(location, location.ranked, WORDS) if one.trial.site.name == "hammer"]
+    forms = [one for one in screened(location, location.ranked, words) if one.trial.site.name == "hammer"]
     best = forms[0]
     assert (best.trial.effect, best.trial.variant) == ("saturation", "rounded")
     assert best.values["limit"] == pytest.approx(limit, rel=0.05)
