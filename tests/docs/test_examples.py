@@ -32,6 +32,7 @@ def test_an_effect_of_ones_own_is_named() -> None:
     [
         ("gap_of_a_robot_axis.py", r"friction of [12][0-9.]+ .*at guide"),
         ("gap_of_a_circuit.py", r"explained 0\.[0-5][0-9]* mV"),
+        ("gap_of_a_damper.py", r"mr_10mm_1A: .*hysteresis"),
     ],
 )
 def test_measured_machines_get_the_answer_of_their_papers(shared_data: Path, example: str, answer: str) -> None:
