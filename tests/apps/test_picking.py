@@ -145,3 +145,19 @@ def test_poles_are_clicked_in_the_browser_and_the_selection_is_kept(response: An
         assert page.complaints == []
         assert until(page, lambda: server.open_pages == 0 or server._loop.is_closed())
     assert same(chladni.identify_modes(response, frequencies_hz=picking.frequencies_hz), picking.modes)
+
+
+def test_the_matrix_is_taken_off_the_page_while_fewer_than_two_modes_are_picked(response: Any) -> None:
+    pytest.importorskip("panel")
+    from chladni.viewers.bench.picking_page import AssuranceChart
+    from chladni.viewers.bench.theme import theme
+
+    # One that is only hidden isn't painted anew when it's shown again.
+    picking, chart = pick_modes(response), AssuranceChart(theme("light"))
+    everything = picking.frequencies_hz
+    shown = []
+    for modes in (everything, everything[:1], everything[:2]):
+        picking.accept(picking.fit(modes))
+        chart.show(picking.shown)
+        shown.append(len(chart.cells.data["row"]) if chart.view.objects else 0)
+    assert shown == [len(everything) ** 2, 0, 4]

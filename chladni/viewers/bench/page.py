@@ -33,12 +33,16 @@ _HEAD_CSS = """
 .head h1 { font-size: 17px; font-weight: 600; color: var(--c-text); margin: 0; }
 .head .grow { flex: 1; }
 """
-#: The page around its parts. Panel's own has scripts inside, which the server's policy for content forbids.
+#: The page around its parts; what is told of a point under the cursor stands outside of them. Panel's own page has
+#: scripts inside, which the server's policy for content forbids.
 _PAGE = Template(
     """<!doctype html>
 <html lang="en">
 <head><meta charset="utf-8"><title>{{ heading }}</title><link rel="icon" href="data:,">
-<style>html, body { display: flow-root; box-sizing: border-box; height: 100%; margin: 0; padding: 0; }</style>
+<style>html, body { display: flow-root; box-sizing: border-box; height: 100%; margin: 0; padding: 0; }
+:root { {{ colours | safe }} }
+.bk-Tooltip { background: var(--c-card); color: var(--c-text); border-color: var(--c-line);
+  --tooltip-arrow-color: var(--c-line); --tooltip-arrow-inner-color: var(--c-card); }</style>
 {{ bokeh_css | safe }}
 {% for address in addresses(bokeh_js) %}
 <script src="{{ address }}"></script>
@@ -127,7 +131,9 @@ def dressed(title: str) -> tuple[Any, Ground]:
     # Inside the page's function: the look belongs to this document, not to the program.
     document.theme = ChartTheme(json=theme(ground).of_charts())
     document.template = _PAGE
-    document.template_variables.update(heading=f"{visible(title)} · chladni", addresses=script_addresses)
+    document.template_variables.update(
+        heading=f"{visible(title)} · chladni", addresses=script_addresses, colours=theme(ground).variables()
+    )
     return document, ground
 
 

@@ -195,13 +195,15 @@ class AssuranceChart:
             "column", "row", "number", source=self.cells, text_align="center", text_baseline="middle",
             text_color="ink", text_font_size="11px",
         )  # fmt: skip
-        self.view = drawing(self.figure, sizing_mode=WIDE)
+        self._drawing = drawing(self.figure, sizing_mode=WIDE)
+        # Put in and taken out: a figure that was hidden isn't painted anew when it's shown.
+        self.view = column(sizing_mode=WIDE)
 
     def show(self, picked: Picked) -> None:
         """Replace the matrix; one mode is like itself, which is nothing to show."""
         names = list(mode_ticks(picked.modes))
-        self.view.visible = len(names) > 1 and len(picked.modes.channels) > 1
-        if not self.view.visible:
+        if len(names) < 2 or len(picked.modes.channels) < 2:
+            self.view.objects = []
             return
         self.figure.x_range.factors, self.figure.y_range.factors = names, names[::-1]
         places = [(line, place) for line in range(len(names)) for place in range(len(names))]
@@ -214,6 +216,8 @@ class AssuranceChart:
             "number": [f"{value:.2f}" if len(names) <= NUMBERED else "" for value in values],
             "ink": ["#101418" if value > 0.55 else "#f0f2f5" for value in values],
         }
+        if not self.view.objects:
+            self.view.objects = [self._drawing]
 
 
 def _no_cells() -> dict[str, list[Any]]:

@@ -1,13 +1,14 @@
 """The stabilisation chart of a page, in which poles are clicked, with measured and synthesised functions below it."""
 
 from collections.abc import Callable
-from math import nan
+from math import ceil, floor, log10, nan
 from typing import Any
 
 import numpy as np
 from bokeh.models import (
     ColumnDataSource,
     CustomJSTickFormatter,
+    FixedTicker,
     HoverTool,
     LogAxis,
     LogScale,
@@ -34,8 +35,12 @@ MARKERS = ("circle", "triangle", "square", "circle")
 STATUSES = ("new", "stable in frequency", "in frequency and damping", "in frequency, damping and vector")
 POLE_SIZE, RING_SIZE = 6, 11
 SIDE_PX = 84
+#: Between the words of a legend and the next sign.
+LEGEND_PX = 14
 #: Of curves on a logarithmic axis: what lies further below the highest says nothing.
 DECADES = 6.0
+#: Up to so many, 2 and 5 of each find room.
+FEW_DECADES = 3
 
 
 class PoleChart:
@@ -91,7 +96,9 @@ class PoleChart:
         chart.extra_y_ranges = {"indicator": _range(low, high)}
         chart.extra_y_scales = {"indicator": LogScale()}
         unit = printed_unit(diagram.indicator_unit)
-        beside = LogAxis(y_range_name="indicator", axis_label=f"{title(diagram)} [{unit}]")
+        beside = LogAxis(
+            y_range_name="indicator", axis_label=f"{title(diagram)} [{unit}]", ticker=_decade_ticks(low, high)
+        )
         chart.add_layout(beside, "right")
         self.curves.data = _curves(diagram)
         chart.multi_line(
@@ -114,7 +121,7 @@ class PoleChart:
             )
             for words, marker, colour in zip(STATUSES, MARKERS, _colours(self._look), strict=True)
         ]
-        chart.add_layout(Legend(items=items, orientation="horizontal"), "above")
+        chart.add_layout(Legend(items=items, orientation="horizontal", spacing=LEGEND_PX), "above")
         told = [("", "@x{0.000} Hz, damping @damping{0.00} %"), ("", "order @y, @status")]
         chart.add_tools(HoverTool(renderers=[poles], tooltips=told), TapTool(renderers=[poles]))
 
@@ -131,16 +138,16 @@ class FunctionChart:
                          legend_label="synthesised")  # fmt: skip
         self.figure.legend.location = "top_left"
         self.figure.legend.orientation = "horizontal"
+        self.figure.legend.spacing = LEGEND_PX
         self.figure.add_layout(self.figure.legend[0], "above")
 
     def show(self, overlay: Overlay | None, unit: str) -> None:
         """Replace both curves; none without an overlay."""
-        axis = self.figure.yaxis[0]
-        axis.axis_label = f"|H| [{printed_unit(unit)}]"
         if overlay is None:
             # The measured function stays where it was: nothing synthesises it.
             self.synthesised.data = {"x": [], "y": []}
             return
+        self.figure.yaxis[0].axis_label = f"|H| [{printed_unit(unit)}]"
         measured, made = np.abs(overlay.measured), np.abs(overlay.synthesised)
         self.measured.data = _line(overlay.measured_hz, measured)
         self.synthesised.data = _line(overlay.frequency_hz, made)
@@ -221,6 +228,13 @@ def _decades(values: Real) -> tuple[float, float]:
         return 0.1, 1.0
     high = float(values.max())
     return max(float(values.min()), high * 10**-DECADES) / 1.5, high * 1.5
+
+
+def _decade_ticks(low: float, high: float) -> FixedTicker:
+    """Mark decades, and 2 and 5 of them where there are few; Bokeh's own marks stop at the highest decade's tenth."""
+    first, last = floor(log10(low)), ceil(log10(high))
+    of_each = (1, 2, 5) if last - first <= FEW_DECADES else (1,)
+    return FixedTicker(ticks=[one * 10.0**decade for decade in range(first, last + 1) for one in of_each])
 
 
 def _line(x: Real, y: Real) -> dict[str, Any]:

@@ -124,6 +124,7 @@ label, .bk-input-group label, .bk-slider-title {{ color: var(--c-soft); font-siz
   background: var(--c-card); color: var(--c-text); border: 1px solid var(--c-line); border-radius: 4px;
   font-family: inherit; font-size: 12.5px; min-height: 24px; padding: 2px 6px;
 }}
+select:not([multiple]).bk-input {{ appearance: auto; background-image: none; }}
 input[type=checkbox] {{ min-height: 0; accent-color: var(--c-accent); }}
 :focus-visible, .bk-input:focus, .noUi-handle:focus {{ outline: 2px solid var(--c-accent); outline-offset: 1px; }}
 .bk-btn.bk-btn-default {{
