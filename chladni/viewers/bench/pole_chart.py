@@ -96,9 +96,8 @@ class PoleChart:
         chart.extra_y_ranges = {"indicator": _range(low, high)}
         chart.extra_y_scales = {"indicator": LogScale()}
         unit = printed_unit(diagram.indicator_unit)
-        beside = LogAxis(
-            y_range_name="indicator", axis_label=f"{title(diagram)} [{unit}]", ticker=_decade_ticks(low, high)
-        )
+        beside: Any = LogAxis(y_range_name="indicator", axis_label=f"{title(diagram)} [{unit}]")
+        beside.ticker = _decade_ticks(low, high)
         chart.add_layout(beside, "right")
         self.curves.data = _curves(diagram)
         chart.multi_line(
