@@ -203,11 +203,13 @@ def _end(bound: float) -> str:
 def _write(
     to: Output, out: Path, followed: "Trends", verdict: "Verdict", *, report: Path | None, save: Path | None
 ) -> None:
-    from chladni.apps.study.trends import trend_sentences
+    from chladni.apps.study.trends import LEAST_TO_CHANGE, trend_sentences
     from chladni.viewers.labels import printed_unit
 
     # A page and a recording write units as their pictures do.
     changes = trend_sentences(followed.trends, unit=printed_unit)
+    if followed.trends and all(len(one.logs) < LEAST_TO_CHANGE for one in followed.trends):
+        changes = (f"No change can be told from scatter yet: that takes {LEAST_TO_CHANGE} logs of a trend.",)
     title = f"{out.name}: {counted(followed.logs, 'log')}"
     if report is not None:
         from chladni.viewers.report.trends import TrendPage, write_trend_report

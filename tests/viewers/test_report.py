@@ -15,9 +15,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.image import imread
 
+from chladni.signals.envelope import FaultLine
 from chladni.signals.errors import LogError
 from chladni.signals.study import Study
 from chladni.signals.visible import visible
+from chladni.spectral.envelope import envelope
 from chladni.viewers.figures import Album
 from chladni.viewers.report import report_html, write_report
 from chladni.viewers.report.markup import element, escaped, table
@@ -221,3 +223,14 @@ def test_print_has_dark_ink_whatever_the_screen(browser: Any, arm: str, tmp_path
     page.goto(path.as_uri())
     assert page.evaluate("getComputedStyle(document.body).color") == "rgb(0, 0, 0)"
     page.close()
+
+
+def test_a_report_of_envelopes_lists_its_channels_and_tells_of_a_bearing_where_there_is_one() -> None:
+    noise = np.random.default_rng(4).standard_normal(8192)
+    (spectrum,) = envelope(noise, band_hz=(100, 300), sample_rate_hz=1000.0)
+    page = report_html(Study(title="s", envelopes=(spectrum,)), interactive=False)
+    assert spectrum.channel.name in page.partition("<h2>Channels</h2>")[2].partition("<h2>")[0]
+    assert "of the bearing" not in page
+    line = FaultLine(name="BPFO", expected_hz=20.0, found_hz=20.0, amplitude=1.0, over_background=9.0)
+    bearing = report_html(Study(title="s", envelopes=(replace(spectrum, faults=(line,)),)), interactive=False)
+    assert "Dashed: frequencies of the bearing" in bearing

@@ -15,6 +15,7 @@ from bokeh.models import (
     LogAxis,
     LogScale,
     LogTicker,
+    PrintfTickFormatter,
     Range1d,
     Toolbar,
     ToolProxy,
@@ -280,6 +281,9 @@ def _dress(plot: Any, axes: Axes, figure: Figure, *, numbered: bool) -> None:
     if axes.get_yscale() == "log":
         # Numbers of a single decade, 1 to 10, would stand on each other.
         plot.yaxis.ticker = LogTicker(mantissas=[1, 2, 5], desired_num_ticks=5)
+    elif axes.get_yscale() == "linear":
+        # Bokeh's own writes small numbers with three zeros and an exponent, 0 among them.
+        plot.yaxis.formatter = PrintfTickFormatter(format="%.8g")
     plot.yaxis.axis_label = _fitted(inert(axes.get_ylabel() or _supported(axes)), _frame_in(figure, axes)) or None
     for axis in (*plot.xaxis, *plot.yaxis):
         _dressed(axis)

@@ -11,6 +11,7 @@ from chladni.viewers.report.markup import element, escaped
 from chladni.viewers.screen_colours import with_dark_scheme
 
 _SIGMA = "Shaded: one sigma of the random error."
+_BEARING = "Dashed: frequencies of the bearing, and their multiples."
 _MASKED = f"{_SIGMA} Lines that nothing excites are left out."
 
 
@@ -46,7 +47,7 @@ class Pictures:
     def figure(self, album: Album, name: str, caption: str) -> str:
         """Give one figure with its caption."""
         plot = None if self._items is None else self._items.plot(album.figures[name])
-        told = element("figcaption", escaped(caption))
+        told = element("figcaption", escaped(caption)) if caption else ""
         if plot is not None and self._items is not None:
             item, height, width = plot
             data = f'<script type="application/json">{item}</script>'
@@ -79,8 +80,11 @@ class Pictures:
         )
 
 
-def sections(pictures: Pictures, album: Album) -> dict[str, str]:
-    """Give the figures of a study as HTML, by the heading of their section, in the order of the work."""
+def sections(pictures: Pictures, album: Album, *, bearing: bool = False) -> dict[str, str]:
+    """Give the figures of a study as HTML, by the heading of their section, in the order of the work.
+
+    `bearing` says that envelope spectra have a bearing's frequencies in them.
+    """
 
     def shown(*captioned: tuple[str, str]) -> str:
         return "".join(pictures.figures(album, section, caption) for section, caption in captioned)
@@ -104,7 +108,7 @@ def sections(pictures: Pictures, album: Album) -> dict[str, str]:
         ),
         "Power spectral densities": shown(("densities", f"One-sided. {_SIGMA}")),
         "Octave bands": shown(("octaves", "Summed from spectral lines.")),
-        "Envelope spectra": shown(("envelopes", "Dashed: frequencies of the bearing, and their multiples.")),
+        "Envelope spectra": shown(("envelopes", _BEARING if bearing else "")),
         "Cepstra": shown(("cepstra", "Grey: three sigma of what scatter makes. Dots: what stands out of it.")),
         "Waterfalls": shown(
             (

@@ -9,7 +9,7 @@ from chladni.signals.study import Study
 from chladni.signals.wording import with_sigma
 from chladni.viewers.labels import printed_unit
 from chladni.viewers.report.markup import element, escaped, table
-from chladni.viewers.style import Style
+from chladni.viewers.style import Style, drawn_channels
 
 
 def peak_table(peaks: Sequence[Peak], style: Style, *, channels: str) -> str:
@@ -43,10 +43,7 @@ def _channel_rows(study: Study, style: Style) -> Iterator[tuple[str, ...]]:
         for channel in series.channels:
             seen.add(channel.name)
             yield (*_place(channel, style), f"{series.sample_rate_hz:.6g}", f"{series.duration_s:.6g}")
-    others = [channel for density in study.densities for channel in density.channels]
-    others += [] if study.response is None else [*study.response.references, *study.response.responses]
-    others += [] if study.modes is None else [*study.modes.references, *study.modes.channels]
-    for channel in others:
+    for channel in drawn_channels(study):
         # Spectra and modes may be shown without their waveforms; their channels are listed all the same.
         if channel.name not in seen:
             seen.add(channel.name)

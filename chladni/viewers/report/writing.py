@@ -55,7 +55,7 @@ def report_html(study: Study, *, album: Album | None = None, interactive: bool |
     """
     album = album or Album.of(study)
     pictures = Pictures(album, interactive=interactive)
-    body = "\n".join(_body(study, sections(pictures, album)))
+    body = "\n".join(_body(study, sections(pictures, album, bearing=any(one.faults for one in study.envelopes))))
     return page(study.title, body, pictures.scripts())
 
 
