@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from chladni.gap.calibration import SAME
-from chladni.gap.robots.body_words import OF_THE_LOG
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.forms import Forms, refined
 from chladni.gap.robots.gains import Gains, guessed_gains, unknown_gains, with_gains
+from chladni.gap.robots.payload_words import OF_THE_LOG
 from chladni.gap.robots.pushes import PUSHED, Push, paying, price, pushed, pushes_of
 from chladni.gap.robots.search import searched
 from chladni.gap.robots.term import Term

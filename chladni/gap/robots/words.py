@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from chladni.gap.records.diagnosis import PARAMETER
-from chladni.gap.robots.body_words import bodies, payloads, readings
 from chladni.gap.robots.coupling_words import couplings
 from chladni.gap.robots.drive_words import delays, drives
 from chladni.gap.robots.joint_words import bristles, friction, inertia, ripple, springs
+from chladni.gap.robots.payload_words import bodies, payloads, readings
 from chladni.gap.robots.term import Form, Term
 from chladni.gap.robots.torques import FormKey, Torques
 from chladni.gap.robots.transmission_words import transmissions
