@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from chladni.apps.demo_log import DemoLog, make_demo_log, setup_text
 from chladni.io.mcap.writer import write_mcap
@@ -22,8 +23,17 @@ def short_arm() -> DemoLog:
 
 def write_arm(folder: Path, *, gain: float = 1.0, name: str = "arm.mcap") -> Path:
     """Write the log and its setup file to a folder; `gain` multiplies what the tool's sensor reads."""
-    made = short_arm()
-    series = [replace(one, values=one.values * gain) if one.channels[0].name == TOOL else one for one in made.series]
-    write_mcap(series, folder / name)
-    (folder / "setup.toml").write_text(setup_text(made.structure), encoding="utf-8")
+    (folder / name).write_bytes(_arm_bytes(gain))
+    (folder / "setup.toml").write_text(setup_text(short_arm().structure), encoding="utf-8")
     return folder / name
+
+
+@cache
+def _arm_bytes(gain: float) -> bytes:
+    """What the log's file holds; to write its messages takes a second."""
+    series = [
+        replace(one, values=one.values * gain) if one.channels[0].name == TOOL else one for one in short_arm().series
+    ]
+    with TemporaryDirectory() as folder:
+        write_mcap(series, Path(folder) / "arm.mcap")
+        return (Path(folder) / "arm.mcap").read_bytes()

@@ -75,6 +75,7 @@ def test_its_numbers_are_those_of_the_law_with_both_dashpots_in_one(found):
     assert values["yield"] == pytest.approx(1 / (1500.0 * kappa), rel=0.4)
 
 
+@pytest.mark.nightly
 def test_a_cube_whose_middle_lies_beside_rest_is_told_with_its_square():
     values = {"cubic": 3e8, "quadratic": -6e5}
     cube = attached("hardening_stiffness", "j0", values, variant="asymmetric")
