@@ -36,12 +36,21 @@ def _has_no_example(path: Path) -> bool:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Heed that outside of this folder, too; what is collected is no garbage, which isn't searched for meanwhile."""
+    """Heed that outside of this folder, too."""
     config.pluginmanager.register(Examples())
-    gc.disable()
     # A shell has it ignored in what runs in its background, and Ctrl-C would be in all that tests start.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What is collected is no garbage, which isn't searched for meanwhile."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -67,7 +76,6 @@ def pytest_collection_finish() -> None:
     """Tests and modules live to the end: each page that is closed would look through a million objects of theirs."""
     gc.collect()
     gc.freeze()
-    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)
