@@ -194,15 +194,15 @@ def _without_worst(named: tuple["Weighed", ...], found: Confirmed) -> tuple["Wei
     """Leave out what acts where the error grew most, the least probable before others."""
     grew = found.per_joint_after**2 - found.per_joint_tuned**2
     worst = int(np.nanargmax(np.where(np.isfinite(grew), grew, np.nan)))
-    there = [one for one in named if worst in one.joints(found)] or list(named)
+    there = [one for one in named if worst in {row % len(found.joints) for row in one.acts}] or list(named)
     return tuple(one for one in named if one is not there[-1])
 
 
 def _without_worse(named: tuple["Weighed", ...], found: Confirmed) -> tuple["Weighed", ...]:
-    """Leave out the least probable law of a joint that it makes worse, though the robot as a whole isn't."""
-    worse = set(np.flatnonzero(found.worse).tolist())
-    laws = [one for one in named if one.term.rows and one.joints(found) & worse]
-    return tuple(one for one in named if not laws or one is not laws[-1])
+    """Leave out the least probable word at a joint that came out worse, though the robot as a whole didn't."""
+    worse = {name for name, is_worse in zip(found.joints, found.worse, strict=True) if is_worse}
+    there = [one for one in named if worse.intersection(one.term.site.split("~"))]
+    return tuple(one for one in named if not there or one is not there[-1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -235,10 +235,6 @@ class Weighed:
     is_felt: bool
     nats: float
     gain: float
-
-    def joints(self, found: Confirmed) -> set[int]:
-        """Rows of the joints at which it acts, whether at their motion or at their loops."""
-        return {row % len(found.joints) for row in self.acts}
 
     @property
     def cause(self) -> Cause:

@@ -5,14 +5,14 @@ from functools import partial
 
 import numpy as np
 
-from chladni.gap.robots.term import INSIDE, PART, Number, Term, at_row, formed, units
+from chladni.gap.robots.term import PART, Number, Term, at_row, formed, units
 from chladni.gap.robots.torques import ALL_COMMANDS, LEAST_OVER, Torques
 from chladni.robots.joint_laws import followed
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
 
-#: Quantiles of the drive's torque (of the command's speed) at which a limit is tried.
-_LIMITS = (0.8, 0.9, 0.96)
+#: Quantiles of the drive's torque (of the command's speed) at which a limit is tried, and a dead zone.
+_LIMITS, _WIDTHS = (0.8, 0.9, 0.96), (0.15, 0.3, 0.5)
 #: Standard deviations before a log is seen: a gain, a delay (s), a lag (s).
 _GAIN, _DELAY_S, _LAG_S = 0.3, 0.01, 0.02
 #: Delays at which their column is tried beside that of a short one.
@@ -70,7 +70,7 @@ def _dead_zone(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
     def make(width: float) -> Term:
         return _of_drive(torques, _limited(torques, row), "dead_zone", lambda: np.clip(asked, -width, width))
 
-    yield from _limits(make, np.quantile(np.abs(asked), INSIDE), "width", units(joint)[0])
+    yield from _limits(make, np.quantile(np.abs(asked), _WIDTHS), "width", units(joint)[0])
 
 
 def _rate_limit(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:

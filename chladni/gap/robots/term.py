@@ -42,9 +42,6 @@ class Number:
 #: another part is a wrong one.
 PART = Number(name="part", unit="1", scale=0.1, least=0.5, about=1.0)
 
-#: Shares of the time that a loop may ask for less than play or a dead zone takes: their widths are tried there.
-INSIDE = (0.03, 0.1, 0.3, 0.6)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Form:

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from chladni.gap.robots.motion import rms
-from chladni.gap.robots.term import INSIDE, PART, Number, Term, at_row, formed, length, usual
+from chladni.gap.robots.term import PART, Number, Term, at_row, formed, length, usual
 from chladni.gap.robots.torques import Torques
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
@@ -20,6 +20,9 @@ from chladni.signals.arrays import Real
 _GIVES = 0.03
 #: Of its link's inertia: less of a rotor isn't felt.
 LEAST_ROTOR = 0.05
+#: Quantiles of the angle by which a loop is pulled aside at which play is tried: a loop that works spends little time
+#: inside, one that bears nothing much.
+_PLAYS = (0.03, 0.1, 0.3, 0.6)
 AT_LINK, AT_MOTOR = "encoder at the link", "encoder at the motor"
 
 
@@ -124,7 +127,7 @@ def _play(torques: Torques, row: int, joint: RobotJoint, passed: Real, soft: Num
             takes=True, rare=True, plainer="joint_elasticity", adds_form=True,
         )  # fmt: skip
 
-    grid = 2.0 * np.quantile(np.abs(asked), INSIDE) / kp
+    grid = 2.0 * np.quantile(np.abs(asked), _PLAYS) / kp
     if grid[0] > 0 and np.all(np.diff(grid) > 0):
         yield from formed(make, grid, name="gap", unit=length(joint), scale=_GIVES)
 
