@@ -216,7 +216,7 @@ class Weighed:
     acts
         Rows of the joints that it changes.
     is_told
-        Whether any of its numbers is beyond its uncertainty, and not at the edge of what it can be.
+        Whether any of its numbers but its place is beyond its uncertainty, and not at the edge of what it can be.
     is_felt
         Whether more torque would be missing without it than any rigid description rounds.
     nats, gain
@@ -295,7 +295,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
             dict.fromkeys(Candidate(effect=one.word, site=one.site) for one in near if one.word not in words)
         ),
         parameters=_parameters(solved, place, candidate),
-        is_told=bool(np.any(_told(best, place))),
+        is_told=bool(np.any(_told(best, place) & [not one.places for one in term.numbers])),
         is_felt=bool(np.max(contest.over_rounding(np.maximum(lost, 0.0))) > 1.0) or strained > TEMPER,
         nats=best.nats - max(rest.nats, unknown),
         gain=best.nats - rest.nats,

@@ -57,7 +57,7 @@ def _spring(torques: Torques, rows: Rows, ratio: float) -> Term:
     mean, travel = float(np.mean(way)), rms(way - np.mean(way))
     force, _, stiffness = units(torques.joints[rows[0]])
     pull = Number(name="stiffness", unit=stiffness, scale=often / travel, least=0.0)
-    constant = Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel))
+    constant = Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel), places=True)
     return Term(
         word="joint_spring", site=_site(torques, rows), rows=rows, numbers=(pull, constant), rare=True, ratio=ratio,
         make=partial(_at, torques, rows, ratio, way, np.ones_like(way)),

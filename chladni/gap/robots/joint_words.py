@@ -161,7 +161,7 @@ def springs(torques: Torques) -> Iterator[Term]:
         travel = rms(torques.position[row] - mean)
         force, _, stiffness = units(joint)
         pull = Number(name="stiffness", unit=stiffness, scale=often / travel, least=0.0)
-        constant = Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel))
+        constant = Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel), places=True)
         yield law(torques, row, "joint_spring", partial(_line, torques.position[row]), pull, constant)
         for side in (1.0, -1.0):
             yield from _stop(torques, row, joint, side, pull)

@@ -28,6 +28,8 @@ class Number:
         What the description believes, which is added when it's told.
     about
         What it's usually about, before the log is seen, beside the nominal one.
+    places
+        Whether it only says where the law is: alone it's no sign of it.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Number:
     least: float = -np.inf
     nominal: float = 0.0
     about: float = 0.0
+    places: bool = False
 
 
 #: Of what a limit takes all is missing, within what servos' gains and filtered columns are off by: a form that needs
