@@ -37,7 +37,7 @@ def test_people_get_a_table_and_a_picture(run, log, tmp_path):
     outcome = run("cepstrum", log, "--kind", "power", "--resolution", 0.5, "--figures", tmp_path)
     assert outcome.code == 0, outcome.err
     assert "Power cepstrum: 99 averages, quefrencies up to 1000 ms" in outcome.out
-    (line,) = [line for line in outcome.out.splitlines() if line.startswith("echo")]
+    (line,) = [line for line in outcome.out.splitlines() if line.startswith("/daq.echo")]
     assert line.split()[1].rstrip(",") == "50"
     assert {path.stem for path in tmp_path.glob("*.png")} == {"cepstrum-1-acceleration"}
 
