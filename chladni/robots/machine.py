@@ -192,6 +192,10 @@ class Coupling:
         """Of a spring: where it pulls nothing."""
         return -self.torque / self.stiffness
 
+    def stiffness_at(self, joint: str) -> float:
+        """Of a spring: what a joint feels of it alone; zero at any other."""
+        return self.stiffness * float(dict(zip(self.joints, (1.0, self.ratio), strict=True)).get(joint, 0.0)) ** 2
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Machine:

@@ -81,7 +81,7 @@ def longest_step_s(machine: Machine, names: Sequence[str]) -> float:
     found = _LONGEST_S
     for one in _chosen(machine, names):
         stiffness = one.gains()[0] + one.stiffness + sum(each.stiffness for each in one.stops)
-        stiffness += sum(each.stiffness for each in machine.couplings if one.joint.name in each.joints)
+        stiffness += sum(each.stiffness_at(one.joint.name) for each in machine.couplings)
         own = float(inertia[one.joint.dof])
         if one.transmission is not None:
             stiffness, own = max(stiffness, tooth_of(one.transmission, own)), min(own, one.transmission.inertia)

@@ -242,6 +242,11 @@ def test_joints_that_a_log_lacks_are_held(rotors: Machine) -> None:
 
 def test_steps_are_short_for_stiff_servos(rotors: Machine) -> None:
     assert longest_step_s(rotors, ("one",)) == pytest.approx(1e-3)
+    # A cable that the second joint winds up twice as far pulls four times as stiffly at it.
+    cable = Coupling(joints=("one", "two"), ratio=2.0, stiffness=20000.0)
+    coupled = replace(rotors, couplings=(cable,))
+    assert [cable.stiffness_at(joint) for joint in ("one", "two", "three")] == [20000.0, 80000.0, 0.0]
+    assert longest_step_s(coupled, ("two",)) == pytest.approx(0.5 * longest_step_s(coupled, ("one",)))
     stiff = with_first(rotors, servo=replace(servo(), kp=40000.0))
     assert longest_step_s(stiff, ("one",)) == pytest.approx(0.3 * np.sqrt(INERTIA / 40000.0))
 

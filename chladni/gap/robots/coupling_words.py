@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from chladni.gap.robots.joint_words import spring_numbers
 from chladni.gap.robots.motion import rms
 from chladni.gap.robots.term import Number, Term, at_row, formed, units, usual
 from chladni.gap.robots.torques import Torques
@@ -53,13 +54,10 @@ def _rubbing(torques: Torques, rows: Rows, sense: float) -> Real:
 
 def _spring(torques: Torques, rows: Rows, ratio: float) -> Term:
     """Spring that winds up with the first joint and, by a ratio, with the second."""
-    way, often = _between(torques.position, rows, ratio), _usual(torques, rows)
-    mean, travel = float(np.mean(way)), rms(way - np.mean(way))
-    force, _, stiffness = units(torques.joints[rows[0]])
-    pull = Number(name="stiffness", unit=stiffness, scale=often / travel, least=0.0)
-    constant = Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel), places=True)
+    way = _between(torques.position, rows, ratio)
+    numbers = spring_numbers(torques.joints[rows[0]], way, _usual(torques, rows))
     return Term(
-        word="joint_spring", site=_site(torques, rows), rows=rows, numbers=(pull, constant), rare=True, ratio=ratio,
+        word="joint_spring", site=_site(torques, rows), rows=rows, numbers=numbers, rare=True, ratio=ratio,
         make=partial(_at, torques, rows, ratio, way, np.ones_like(way)),
     )  # fmt: skip
 

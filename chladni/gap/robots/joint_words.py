@@ -157,14 +157,21 @@ def _dahl(position: Real, yields: float, stretches: tuple[tuple[int, int], ...])
 def springs(torques: Torques) -> Iterator[Term]:
     """Springs beside a joint, and stops inside its way."""
     for row, joint in torques.rows:
-        often, mean = usual(torques, row), float(np.mean(torques.position[row]))
-        travel = rms(torques.position[row] - mean)
-        force, _, stiffness = units(joint)
-        pull = Number(name="stiffness", unit=stiffness, scale=often / travel, least=0.0)
-        constant = Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel), places=True)
+        pull, constant = spring_numbers(joint, torques.position[row], usual(torques, row))
         yield law(torques, row, "joint_spring", partial(_line, torques.position[row]), pull, constant)
         for side in (1.0, -1.0):
             yield from _stop(torques, row, joint, side, pull)
+
+
+def spring_numbers(joint: RobotJoint, way: Real, often: float) -> tuple[Number, Number]:
+    """Give stiffness and constant of a spring over a way ``[coarse]`` whose torque is often so large."""
+    mean = float(np.mean(way))
+    travel = rms(way - mean)
+    force, _, stiffness = units(joint)
+    return (
+        Number(name="stiffness", unit=stiffness, scale=often / travel, least=0.0),
+        Number(name="torque", unit=force, scale=often * (1.0 + abs(mean) / travel), places=True),
+    )
 
 
 def _line(position: Real) -> tuple[Real, ...]:
