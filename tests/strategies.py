@@ -265,6 +265,7 @@ def modal_fits(draw: st.DrawFn, responses: int, references: int, *, modes: int =
         function_error=draw(reals(functions, st.floats(0.0, 1.0))),
         bands_hz=np.stack([edges[:-1], edges[1:]], axis=1),
         band_error=draw(reals((modes,), st.floats(0.0, 1.0))),
+        poles_hz=np.linspace(1.0, 10.0, modes),
     )
 
 

@@ -39,11 +39,13 @@ def print_modes(out: Output, modes: "ModeSet", validation: "ModeValidation") -> 
 
 
 def _title(modes: "ModeSet") -> str:
+    from chladni.modal.shapes.mode_words import synthesised_from
+
     count = modes.frequency_hz.size
     told = f"{count} mode{'s' if count != 1 else ''}"
     if modes.fit is None:
         return told
-    return f"{told}; the synthesis is {modes.fit.error:.2%} from the measured functions"
+    return f"{told}; the synthesis of {synthesised_from(modes)} is {modes.fit.error:.2%} from the measured functions"
 
 
 def _sources(modes: "ModeSet") -> str:

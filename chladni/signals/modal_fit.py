@@ -30,6 +30,9 @@ class ModalFit(Value):
         ``[band, 2]`` low and high end of each band, one around each mode, without gaps between.
     band_error
         ``[band]`` the same over all functions in each band.
+    poles_hz
+        ``[pole]`` frequencies of all poles in the synthesis, rising: those of the modes, and of others that were found
+        and weren't asked for.
     """
 
     frequency_hz: Real
@@ -40,6 +43,7 @@ class ModalFit(Value):
     function_error: Real
     bands_hz: Real
     band_error: Real
+    poles_hz: Real
 
     def __post_init__(self) -> None:
         require_frequency_axis(self.frequency_hz)
@@ -49,3 +53,7 @@ class ModalFit(Value):
             require_shape(name, getattr(self, name), functions, "responses x references")
         require_shape("bands_hz", self.bands_hz, (self.band_error.size, 2), "bands x (low, high)")
         self._freeze()
+
+    def others(self, modes: int) -> int:
+        """Give how many poles are in the synthesis besides so many modes."""
+        return max(int(self.poles_hz.size) - modes, 0)

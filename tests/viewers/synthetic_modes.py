@@ -116,6 +116,7 @@ def _arm_modes(
             function_error=np.sqrt(error.sum(axis=2) / (np.abs(response.values) ** 2).sum(axis=2)),
             bands_hz=np.column_stack([natural.frequency_hz - 5, natural.frequency_hz + 5]),
             band_error=np.full(count, 0.028),
+            poles_hz=natural.frequency_hz,
         ),
         stabilisation=stabilisation(natural.frequency_hz, natural.damping_ratio, response),
         provenance=MODES_PROVENANCE,

@@ -62,7 +62,7 @@ def join_bands(sets: Sequence[ModeSet]) -> ModeSet:
         scale=_scale(sets, choice),
         spread=_spread(sets, choice),
         harmonics=tuple({line.frequency_hz: line for one in sets for line in one.harmonics}.values()),
-        fit=_fit(sets),
+        fit=_fit(sets, choice.of([one.frequency_hz for one in sets])),
         stabilisation=_diagram(sets, choice),
         provenance=_provenance(sets, choice),
     )
@@ -187,7 +187,7 @@ def _diagram(sets: Sequence[ModeSet], choice: _Choice) -> StabilisationDiagram |
     )
 
 
-def _fit(sets: Sequence[ModeSet]) -> ModalFit | None:
+def _fit(sets: Sequence[ModeSet], modes_hz: Real) -> ModalFit | None:
     parts = sorted((one.fit for one in sets if one.fit is not None), key=lambda fit: float(fit.frequency_hz.mean()))
     if len(parts) != sum(one.frequency_hz.size > 0 for one in sets) or not parts:
         return None
@@ -214,7 +214,13 @@ def _fit(sets: Sequence[ModeSet]) -> ModalFit | None:
         function_error=np.sqrt(sum(wrong) / np.maximum(sum(power), 1e-300)),
         bands_hz=np.concatenate([fit.bands_hz for fit in parts]),
         band_error=np.concatenate([fit.band_error for fit in parts]),
+        poles_hz=np.sort(np.concatenate([modes_hz, *(_others_hz(one) for one in sets)])),
     )
+
+
+def _others_hz(found: ModeSet) -> Real:
+    """Poles of a band's synthesis that are none of its modes."""
+    return np.zeros(0) if found.fit is None else np.setdiff1d(found.fit.poles_hz, found.frequency_hz)
 
 
 def _power(fit: ModalFit) -> Real:

@@ -55,6 +55,7 @@ def modal_fit(
             np.array([wrong[..., band].sum() for band in inside]),
             np.array([power[..., band].sum() for band in inside]),
         ),
+        poles_hz=np.sort(model.frequency_hz),
     )
 
 

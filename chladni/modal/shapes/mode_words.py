@@ -18,6 +18,16 @@ def mode_names(modes: ModeSet, rows: Sequence[int]) -> str:
     return f"modes {numbers} ({joined([f'{modes.frequency_hz[row]:.4g}' for row in rows])} Hz)"
 
 
+def synthesised_from(modes: ModeSet) -> str:
+    """Name what the synthesis of the modes' fit is made of: ``the modes and 7 further poles that were found``."""
+    others = 0 if modes.fit is None else modes.fit.others(modes.frequency_hz.size)
+    which = "the mode" if modes.frequency_hz.size == 1 else "the modes"
+    if not others:
+        return which
+    further = "one further pole that was" if others == 1 else f"{others} further poles that were"
+    return f"{which} and {further} found"
+
+
 def capital(text: str) -> str:
     """Begin a sentence; the rest keeps its case, which units need.
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from chladni.modal.shapes.joint_treatment import JointTreatment, treatments
-from chladni.modal.shapes.mode_words import capital, joined, mode_names
+from chladni.modal.shapes.mode_words import capital, joined, mode_names, synthesised_from
 from chladni.modal.shapes.neighbours import neighbour_note
 from chladni.signals.arrays import Real
 from chladni.signals.geometry import Geometry
@@ -91,13 +91,14 @@ def _fit(modes: ModeSet) -> list[str]:
     fit = modes.fit
     if fit is None:
         return []
-    share = f"{100 * fit.error:.2g} %"
+    share, which = f"{100 * fit.error:.2g} %", capital(synthesised_from(modes))
+    verb = "reproduces" if which == "The mode" else "reproduce"
     if fit.error <= _GOOD_FIT:
-        return [f"The modes reproduce the measured functions to {share} (RMS of the difference over RMS)."]
+        return [f"{which} {verb} the measured functions to {share} (RMS of the difference over RMS)."]
     row, column = np.unravel_index(int(np.argmax(fit.function_error)), fit.function_error.shape)
     worst = f"{modes.channels[row].name} over {modes.references[column].name}"
     sentence = (
-        f"The modes reproduce the measured functions to {share} (RMS of the difference over RMS, noise of the "
+        f"{which} {verb} the measured functions to {share} (RMS of the difference over RMS, noise of the "
         f"measurement included), worst in {worst} ({100 * fit.function_error[row, column]:.2g} %)."
     )
     return [sentence]

@@ -11,6 +11,7 @@ from bokeh.document import Document
 from bokeh.models import ColumnDataSource, FactorRange
 from bokeh.plotting import figure
 
+from chladni.modal.shapes.mode_words import synthesised_from
 from chladni.signals.channel import labels_of
 from chladni.viewers.bench.errors import told
 from chladni.viewers.bench.latest import Latest
@@ -231,11 +232,22 @@ def _told(picked: Picked) -> str:
     headings, rows = mode_table(picked.modes, None)
     head = "".join(f"<th>{escape(text)}</th>" for text in headings)
     body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in one)}</tr>" for one in rows)
-    made = picked.synthesis
-    error = "" if made is None else f"<p>The synthesis of these modes is {made.error:.1%} off the functions.</p>"
     listed = ", ".join(f"{one:g}" for one in picked.frequencies_hz)
     return (
         "<p>Click a pole to pick its mode, or one with a ring to let go of it.</p>"
-        f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{error}"
+        f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{_synthesis_told(picked)}"
         f"<p>This list gives the same modes again:</p><code>{inert(f'frequencies_hz=[{listed}]')}</code>"
+    )
+
+
+def _synthesis_told(picked: Picked) -> str:
+    """How far the picked modes alone are off, and how far they are with what the terminal counts beside them."""
+    whole, alone = picked.modes.fit, picked.synthesis
+    if whole is None or alone is None:
+        return ""
+    if not whole.others(len(picked.frequencies_hz)):
+        return f"<p>The synthesis of these modes is {whole.error:.2%} from the measured functions.</p>"
+    return (
+        f"<p>The synthesis of these modes alone is {alone.error:.2%} from the measured functions. That of "
+        f"{synthesised_from(picked.modes)} is {whole.error:.2%} from them.</p>"
     )

@@ -1,5 +1,6 @@
 """The report's sections about modes."""
 
+from chladni.modal.shapes.mode_words import synthesised_from
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
 from chladni.viewers.mode_tables import advice, first_of_each, mode_table, motion_table
@@ -34,7 +35,9 @@ def relative_motion_section(study: Study, modes: ModeSet, style: Style) -> str:
 
 def _made(modes: ModeSet) -> str:
     method = f"Method: {modes.provenance.estimator}. " if modes.provenance.estimator else ""
-    error = f" Error of the synthesis: {modes.fit.error:.1%}." if modes.fit is not None else ""
+    error = ""
+    if modes.fit is not None:
+        error = f" Error of the synthesis of {synthesised_from(modes)}: {modes.fit.error:.1%}."
     scale = ""
     if modes.scale is not None:
         scale = f" Scaled at {modes.scale.response} over {modes.scale.reference}, greatest component 1."

@@ -121,3 +121,11 @@ def test_many_machines_take_one_sentence() -> None:
     lines = tuple(MachineHarmonic(frequency_hz=25.0 * k, reason="kurtosis 1.5") for k in (1, 2, 3))
     (told,) = [one for one in summary_of(mode_set(SOUND, harmonics=lines)) if "machine" in one]
     assert told.startswith("Lines of machines, no modes: 25, 50 and 75 Hz")
+
+
+def test_poles_that_nobody_asked_for_are_told_of_the_fit() -> None:
+    modes = mode_set(SOUND, references=REFERENCE, participation=np.ones((2, 1), complex))
+    text = summary_of(replace(modes, fit=fit_of([0.01, 0.02, 0.15], [0.01, 0.02], (5.0, 10.0, 20.0, 30.0))))
+    assert any(one.startswith("The modes and 2 further poles that were found reproduce the") for one in text)
+    single = replace(modes.select(np.array([1])), fit=fit_of([0.01, 0.02, 0.03], [0.01, 0.02], (20.0,)))
+    assert any(one.startswith("The mode reproduces the measured functions to 3 %") for one in summary_of(single))

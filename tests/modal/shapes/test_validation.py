@@ -25,7 +25,9 @@ def fitted(fit: ModalFit, **fields: Any) -> ModeSet:
     return mode_set(SOUND, references=REFERENCE, participation=np.ones((2, 1), complex), fit=fit, **fields)
 
 
-def fit_of(function_error: list[float], band_error: list[float]) -> ModalFit:
+def fit_of(
+    function_error: list[float], band_error: list[float], poles_hz: tuple[float, ...] = (10.0, 20.0)
+) -> ModalFit:
     count, bands = len(function_error), len(band_error)
     return ModalFit(
         frequency_hz=np.array([5.0, 10.0, 25.0]),
@@ -36,6 +38,7 @@ def fit_of(function_error: list[float], band_error: list[float]) -> ModalFit:
         function_error=np.array(function_error)[:, np.newaxis],
         bands_hz=np.array([[5.0, 15.0], [15.0, 25.0]])[:bands],
         band_error=np.array(band_error),
+        poles_hz=np.array(poles_hz),
     )
 
 
