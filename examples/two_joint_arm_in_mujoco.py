@@ -136,8 +136,11 @@ def draw(found: Diagnosis, elbow: np.ndarray, path: Path) -> None:
     bottom.plot(*elbow, "k.", markersize=2, label="machine (not in the log)")
     bottom.plot(motion.velocity, motion.force, "C0.", markersize=2, label="found")
     bottom.set(xlabel="speed of the elbow [rad/s]", ylabel="friction [N m]", xlim=(-3, 3))
+    # Room above for the legend, which hides no curve there.
+    top.margins(y=0.2)
+    top.legend(loc="upper center", ncols=3)
+    bottom.legend(loc="lower right")
     for axes in (top, bottom):
-        axes.legend(loc="upper right")
         axes.grid(alpha=0.3)
     figure.savefig(path, dpi=110)
     plt.close(figure)

@@ -68,7 +68,7 @@ def make(
     there = f"; {counted(count - made)} of {counted(count)} were there" if made < count else ""
     to.line(f"made {cases(made, 'case')} in {directory / 'cases'}{there}")
     to.line(f"their truths are in {directory / 'truth'}: move it away before the run, and back for the score")
-    to.json({"format": "chladni.blind-make/1", "directory": str(directory), "count": count, "seed": seed,
+    to.json(lambda: {"format": "chladni.blind-make/1", "directory": str(directory), "count": count, "seed": seed,
              "generator": generator, "made": made})  # fmt: skip
 
 
@@ -110,7 +110,7 @@ def run(
     to.line(f"diagnosed {counted(report.done)} cases; {counted(report.there)} had a result")
     if report.failed:
         to.lines([f"Warning: no answer for {', '.join(report.failed)}; their results say why"])
-    to.json({"format": "chladni.blind-run/1", "done": report.done, "there": report.there,
+    to.json(lambda: {"format": "chladni.blind-run/1", "done": report.done, "there": report.there,
              "failed": list(report.failed)})  # fmt: skip
 
 
@@ -170,4 +170,4 @@ def score(
 
         for path in save_album(campaign_album(found), figures):
             to.line(f"figure: {path}")
-    to.json(found)
+    to.json(lambda: found)

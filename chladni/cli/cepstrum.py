@@ -51,7 +51,7 @@ def cepstrum(
     study = Study(title=log.name, cepstra=found.cepstra, findings=(*told, *found.notes))
     out.csv(found.cepstra)
     out.pictures(study, figures=targets.figures, report=targets.report)
-    out.json(cepstrum_document(found))
+    out.json(cepstrum_document, found)
 
 
 def _print_peaks(out: Output, found: "Cepstrum") -> None:

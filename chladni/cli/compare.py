@@ -77,7 +77,7 @@ def compare(
         _print_modes(out, found.modes)
     out.lines(found.notes)
     _picture(out, found, titles, figures=figures, report=report)
-    out.json(comparison_document(found))
+    out.json(comparison_document, found)
 
 
 def _picture(

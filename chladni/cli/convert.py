@@ -74,7 +74,7 @@ def convert(
         f"{number(written.duration_s, digits=6)} s"
     )
     out.lines((*written.notes, *unread_sentences(one for one in written.unread if not one.complete), *written.losses))
-    out.json(_document(written))
+    out.json(_document, written)
 
 
 def _document(written: "Conversion") -> dict[str, Any]:

@@ -70,7 +70,7 @@ def delay(
         from chladni.viewers.figures.correlation import delay_figures
 
         out.figures("delay", delay_figures(found), figures)
-    out.json(delay_document(found))
+    out.json(delay_document, found)
 
 
 def _print_delays(out: Output, found: "TimeDelays") -> None:

@@ -39,7 +39,7 @@ def demo(
     for path in tour.files:
         to.line(f"wrote {path}")
     to.json(
-        {
+        lambda: {
             "format": "chladni.demo/1",
             "comparisons": [
                 {"what": one.what, "found": one.found, "std": one.std, "truth": one.truth, "unit": one.unit}

@@ -75,7 +75,7 @@ def envelope(
     study = Study(title=log.name, envelopes=found.spectra, findings=(*told, *found.notes))
     out.csv(found.spectra)
     out.pictures(study, figures=targets.figures, report=targets.report)
-    out.json(envelope_document(found))
+    out.json(envelope_document, found)
 
 
 def _bearing(text: str) -> "Bearing":

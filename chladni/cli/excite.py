@@ -88,7 +88,7 @@ def excite(
     write_trajectory(made, out)
     _print(to, made)
     to.line(f"wrote {out}")
-    to.json(made.to_json())
+    to.json(made.to_json)
 
 
 def _print(to: Output, made: "Trajectory") -> None:

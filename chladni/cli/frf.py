@@ -64,7 +64,7 @@ def frf(
         )
     out.csv([study.response for study in studies if study.response is not None])
     out.pictures(*studies, figures=targets.figures, report=targets.report, looks=looks)
-    out.documents({one.title: frf_document(one.response, one.response_peaks) for one in studies if one.response})
+    out.documents(frf_document, [(one.title, (one.response, one.response_peaks)) for one in studies])
 
 
 def _print_response(

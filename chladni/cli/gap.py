@@ -272,7 +272,7 @@ def _diagnose(
             progress=lambda step, share: progress(share, step),
         )
     # First: what took so long to find isn't lost to a picture or a model that can't be written.
-    out.json(gap_document(found))
+    out.json(gap_document, found)
     print_diagnosis(out, found)
     _draw(out, found, model, wanted)
     if wanted.write_model is not None:
@@ -333,7 +333,10 @@ def _compare(
     else:
         print_by_level(out, several)
     _draw_comparisons(out, found, () if several is None else several.sentences(), wanted)
-    out.json(comparison_document(found[0]) if several is None else by_level_document(several))
+    if several is None:
+        out.json(comparison_document, found[0])
+    else:
+        out.json(by_level_document, several)
 
 
 def _draw_comparisons(

@@ -75,7 +75,7 @@ def influence(
 
         drawn = {"influence": influence_figure(table), "influence finite": influence_figure(table, of="finite")}
         to.figures("influence", drawn, figures)
-    to.json(influence_document(table))
+    to.json(influence_document, table)
 
 
 def _print(to: Output, table: "InfluenceTable", change: float) -> None:

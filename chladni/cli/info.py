@@ -70,7 +70,7 @@ def info(
     out.lines(found.findings)
     if matched is not None:
         _print_robot(out, matched)
-    out.json(content)
+    out.json(lambda: content)
 
 
 def _matched(robot: Path, log: "Log", state: str | None, command: str | None) -> "RobotLogInfo":

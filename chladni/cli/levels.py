@@ -76,7 +76,7 @@ def levels(
     out.csv([*found.levels, *found.severities])
     study = Study(title=log.name, levels=found.levels, severities=found.severities, findings=findings)
     out.pictures(study, figures=targets.figures, report=targets.report)
-    out.json(levels_document(found))
+    out.json(levels_document, found)
 
 
 def _print_levels(out: Output, found: "Levels") -> None:

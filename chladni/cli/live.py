@@ -194,7 +194,7 @@ def live(
         last = _follow(following.states(source, stop), out, book, showing.targets(out))
     findings = _told(out, last, book)
     out.pictures(live_study(last, findings), figures=figures, report=report)
-    out.json(live_document(last, book))
+    out.json(live_document, last, book)
 
 
 def _follow(states: "Iterator[LiveState]", out: Output, book: "EventBook", targets: "list[Target]") -> "LiveState":

@@ -129,4 +129,4 @@ def _write(
         out.line(f"recording: {write_rrd(found.study, save)}")
     out.pictures(found.study, figures=targets.figures, report=targets.report)
     motions, passed_on = found.study.relative_motion, found.transmissibility
-    out.json(modes_document(found.modes, found.validation, motions, passed_on))
+    out.json(modes_document, found.modes, found.validation, motions, passed_on)

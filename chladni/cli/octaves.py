@@ -54,7 +54,7 @@ def octaves(
     study = Study(title=log.name, octaves=found.octaves, findings=(*told, *found.notes))
     out.csv(found.octaves)
     out.pictures(study, figures=targets.figures, report=targets.report)
-    out.json(octaves_document(found))
+    out.json(octaves_document, found)
 
 
 def _print_bands(out: Output, found: "OctaveLevels") -> None:

@@ -55,7 +55,7 @@ def ods(
         from chladni.viewers.figures.deflection import deflection_figures
 
         out.figures("ods", deflection_figures(found), figures)
-    out.json(deflection_document(found))
+    out.json(deflection_document, found)
 
 
 def _print_shapes(out: Output, found: "DeflectionShapes") -> None:

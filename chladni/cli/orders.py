@@ -117,7 +117,7 @@ def orders(
         from chladni.viewers.figures.orders import order_figures
 
         out.figures("orders", order_figures(found.maps, found.cuts), figures)
-    out.json(orders_document(found))
+    out.json(orders_document, found)
 
 
 def _print_cuts(out: Output, cuts: "OrderCuts") -> None:

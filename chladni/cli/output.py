@@ -2,11 +2,11 @@
 
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, Self
 
 from rich import box
 from rich.console import Console
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from chladni.signals.value import Value
     from chladni.viewers.figures import Album
 
+P = ParamSpec("P")
 PROGRESS_AFTER_S = 1.0
 STANDARD_OUTPUT = 1
 # Rows of a table: terminals keep about as many lines to scroll back through.
@@ -199,25 +200,31 @@ class Output:
         for path in save_album(Album({command: drawn}), folder):
             self.line(f"figure: {path}")
 
-    def json(self, content: Mapping[str, Any]) -> None:
-        """Write `content` where ``--json`` said; nothing when it wasn't given."""
+    def json(self, document: Callable[P, Mapping[str, Any]], *args: P.args, **options: P.kwargs) -> None:
+        """Write the document of these values where ``--json`` said; it isn't made when that wasn't given."""
         if self.json_target is None:
             return
         # UTF-8, whatever the terminal's encoding.
-        encoded = document_text(content).encode()
+        encoded = document_text(document(*args, **options)).encode()
         if self.json_target != "-":
             with atomic_write(self.json_target) as file:
                 file.write(encoded)
             return
         _send(encoded)
 
-    def documents(self, contents: Mapping[str, Mapping[str, Any]]) -> None:
-        """Write the document of one log, or those of several, each with its log's name."""
-        if len(contents) == 1:
-            self.json(*contents.values())
+    def documents(
+        self, document: Callable[..., Mapping[str, Any]], values: Sequence[tuple[str, tuple[Any, ...]]]
+    ) -> None:
+        """Write the document of one log, made of its values, or those of several, each with its log's name."""
+        if len(values) == 1:
+            self.json(document, *values[0][1])
             return
-        logs = [{"log": name, **content} for name, content in contents.items()]
-        self.json({"format": "chladni.logs/1", "logs": logs})
+        self.json(
+            lambda: {
+                "format": "chladni.logs/1",
+                "logs": [{"log": name, **document(*some)} for name, some in values],
+            }
+        )
 
     @property
     def csv_streams(self) -> bool:

@@ -51,7 +51,7 @@ def psd(
         studies.append(study)
     out.csv([density for study in studies for density in study.densities])
     out.pictures(*studies, figures=targets.figures, report=targets.report, looks=looks)
-    out.documents({study.title: psd_document(study.densities) for study in studies})
+    out.documents(psd_document, [(study.title, (study.densities,)) for study in studies])
 
 
 def _print_study(out: Output, study: "Study", named: "list[UnitPeaks]") -> None:

@@ -35,7 +35,7 @@ def query(
         out.line("done; the question gives no rows")
     else:
         out.table(counted(answer.num_rows, "row"), columns, [[_cell(row[one]) for one in columns] for row in rows])
-    out.json({"format": "chladni.query/1", "columns": columns, "rows": [_plain(row) for row in rows]})
+    out.json(lambda: {"format": "chladni.query/1", "columns": columns, "rows": [_plain(row) for row in rows]})
     if csv is not None:
         from chladni.io.study.results import write_answer
 

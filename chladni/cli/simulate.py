@@ -128,7 +128,7 @@ def simulate(
     to.line(f"wrote {written.path}")
     to.line(f"wrote {truth}")
     nrmse = {score.name.removeprefix("NRMSE "): score.value for score in made.agreement}
-    to.json({**made.truth, "format": "chladni.simulate/1", "log": str(written.path), "truth_file": str(truth),
+    to.json(lambda: {**made.truth, "format": "chladni.simulate/1", "log": str(written.path), "truth_file": str(truth),
              "nrmse_percent": nrmse})  # fmt: skip
 
 

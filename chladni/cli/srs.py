@@ -73,7 +73,7 @@ def srs(
         from chladni.viewers.figures.shock_response import shock_figures
 
         out.figures("srs", shock_figures(found), figures)
-    out.json(shock_document(found))
+    out.json(shock_document, found)
 
 
 def _print_highest(out: Output, found: "ShockResponse") -> None:

@@ -239,7 +239,7 @@ def _send(to: Output, ran: "StudyReport", followed: "Trends", verdict: "Verdict"
         for one in verdict.outside
     ]
     to.json(
-        {
+        lambda: {
             "format": "chladni.study-run/1", "logs": ran.logs, "there": ran.there, "done": ran.done,
             "unread": ran.unread, "damaged": ran.damaged, "unchanged": ran.unchanged,
             "seconds": ran.seconds, "cpu_s": ran.cpu_s,

@@ -63,7 +63,7 @@ def tolerance(
     out.lines((*told, *(note for one in found for note in (*one.notes, *one.density.provenance.notes))))
     if figures is not None:
         _save_figures(out, found, unit, figures)
-    out.json(tolerance_document(found))
+    out.json(tolerance_document, found)
 
 
 def _point(text: str) -> tuple[float, float]:

@@ -72,13 +72,13 @@ def _show(study: "Study", out: Output, *, save: Path | None, web: bool) -> None:
     if save is not None:
         path = str(write_rrd(study, save))
         out.line(f"recording: {path}")
-        out.json(document | {"path": path})
+        out.json(lambda: document | {"path": path})
     elif web:
         with serve_web(study) as server:
             out.line(f"{server.address}")
             out.line("Open this address in a browser on this computer (nobody else can reach it); Ctrl-C ends.")
-            out.json(document | {"address": server.address})
+            out.json(lambda: document | {"address": server.address})
             server.wait()
     else:
         spawn(study)
-        out.json(document)
+        out.json(lambda: document)

@@ -43,7 +43,7 @@ def waterfall(
     out.pictures(
         Study(title=log.name, waterfalls=found, findings=findings), figures=targets.figures, report=targets.report
     )
-    out.json(waterfalls_document(found))
+    out.json(waterfalls_document, found)
 
 
 def _print_slices(out: Output, found: "Waterfall") -> None:

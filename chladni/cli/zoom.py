@@ -55,7 +55,7 @@ def zoom(
     out.lines((*told, *dict.fromkeys(note for one in found for note in one.provenance.notes)))
     if figures is not None:
         _save_figures(out, found, figures)
-    out.json(zoom_document(found))
+    out.json(zoom_document, found)
 
 
 def _print_highest(out: Output, found: "Sequence[AmplitudeSpectrum]") -> None:

@@ -31,8 +31,8 @@ class ModalFit(Value):
     band_error
         ``[band]`` the same over all functions in each band.
     poles_hz
-        ``[pole]`` frequencies of all poles in the synthesis, rising: those of the modes, and of others that were found
-        and weren't asked for.
+        ``[pole]`` frequencies of all poles in the synthesis, rising: those of the modes, and of others that were
+        found and weren't asked for.
     """
 
     frequency_hz: Real

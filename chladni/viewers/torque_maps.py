@@ -8,6 +8,8 @@ from chladni.signals.arrays import Index
 
 #: A few wild samples of a differentiated motion must not flatten all others.
 SHOWN, ROOM = 99.0, 1.15
+#: Letters of two joints' names that have room below a small picture.
+LONGEST = 28
 
 
 def maps_over(found: Diagnosis, over: Over) -> list[TorqueMap]:
@@ -18,6 +20,18 @@ def maps_over(found: Diagnosis, over: Over) -> list[TorqueMap]:
 def map_title(one: TorqueMap) -> str:
     """Site, both joints of a pair by what they share."""
     return one.site.replace("~", " with ")
+
+
+def motion_name(one: TorqueMap) -> str:
+    """What the torque is drawn over: the motion of a joint, or of a pair the sum that its gears make of two."""
+    if one.ratio is None:
+        return one.over
+    share = "" if abs(one.ratio) == 1.0 else f"{abs(one.ratio):.3g} × "
+    first, second = one.site.split("~")
+    if len(first) + len(second) > LONGEST:
+        # The title names both, in this order.
+        first, second = "the first", "the second"
+    return f"{one.over} of {first} {'−' if one.ratio < 0 else '+'} {share}{second}"
 
 
 def torque_range(one: TorqueMap) -> tuple[float, float]:

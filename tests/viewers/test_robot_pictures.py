@@ -14,6 +14,7 @@ from chladni.apps.robot_scene import robot_scene
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.robots.diagnose import diagnose_robot
 from chladni.viewers.figures.gap import gap_album
+from chladni.viewers.figures.robot import torque_map_figures
 from chladni.viewers.report.gap import gap_report_html
 from chladni.viewers.rerun.gap import write_gap_rrd
 from chladni.viewers.robot_scene import RobotScene
@@ -178,3 +179,19 @@ def test_a_robot_that_no_simulation_holds_is_drawn_as_measured(found: Diagnosis,
     assert not any(entity.startswith(("/robot/before", "/robot/after")) for entity in one.entities())
     assert "Measured; no simulation holds" in one.view_names()
     assert not gap_album(gap_evidence(alone)).sections["motion"]
+
+
+@pytest.mark.parametrize(
+    ("site", "ratio", "told"),
+    [
+        ("joint_5~joint_6", 1.0, "velocity of joint_5 + joint_6"),
+        ("joint_5~joint_6", -0.5, "velocity of joint_5 − 0.5 × joint_6"),
+        ("left_shoulder_pitch~left_shoulder_roll", 2.0, "velocity of the first + 2 × the second"),
+    ],
+)
+def test_a_pair_says_which_sum_of_two_motions_it_is_drawn_over(
+    found: Diagnosis, site: str, ratio: float, told: str
+) -> None:
+    pair = replace(next(one for one in found.torque_maps if one.over == "velocity"), site=site, ratio=ratio)
+    [figure] = torque_map_figures(gap_evidence(replace(found, torque_maps=(pair,))), "velocity").values()
+    assert figure.axes[0].get_xlabel() == f"{told} [rad/s]"

@@ -66,6 +66,8 @@ class TorqueMap(Value):
         friction does with load. `law` and `spread` are None where no law was found.
     is_named
         Whether the law is of causes that are named.
+    ratio
+        Of a pair: `motion` is that of the first joint and `ratio` times that of the second. None of a single joint.
     """
 
     site: str
@@ -82,6 +84,7 @@ class TorqueMap(Value):
     law: Real | None
     spread: Real | None
     is_named: bool
+    ratio: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("torque", "load"):

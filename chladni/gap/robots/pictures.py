@@ -153,12 +153,12 @@ class _Maps:
         motion: Real,
         described: Real,
         laws: Sequence[tuple[Term, Real, Real]],
-        ratio: float = 1.0,
+        ratio: float | None = None,
     ) -> TorqueMap:
-        torques = self._torques
+        torques, by = self._torques, ratio or 1.0
         own = sum((_added(term, values, row) for term, values, _ in laws), start=np.zeros_like(motion))
         moving = np.flatnonzero(torques.moving[row])
-        rows = (motion, (self._left[row] + own) / ratio + described, own / ratio + described, described)
+        rows = (motion, (self._left[row] + own) / by + described, own / by + described, described)
         x, torque, law, has = (one[moving] for one in rows)
         bins = list(_bins(x, over, torques.numbers_a_sample))
 
@@ -178,6 +178,7 @@ class _Maps:
             centre=means(x), mean=means(torque), error=scatter(torque) / np.sqrt(np.maximum(independent, 1.0)),
             described=means(has), law=means(law) if laws else None, spread=scatter(law) if laws else None,
             is_named=bool(laws) and all((term.word, term.site) in self._named for term, *_ in laws),
+            ratio=ratio,
         )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from chladni.signals.arrays import Whole
 from chladni.signals.trend import Trend, TrendKind
 from chladni.viewers.figures.sheet import look, paint, plain, sheet
 from chladni.viewers.labels import printed_unit
@@ -20,6 +21,7 @@ PANE_IN: Final = 1.15
 SECTIONS: Final[Mapping[TrendKind, str]] = {
     "mode": "Natural frequencies", "damping": "Damping ratios", "level": "Levels", "line": "Lines", "cause": "Causes"
 }  # fmt: skip
+HALF_DAY_NS: Final = 12 * 3600 * 10**9
 VALUES, EXPECTED, CHANGED = paint(ON_LIGHT[0]), paint(ON_LIGHT[7]), paint(ON_LIGHT[1])
 
 
@@ -37,6 +39,13 @@ def trend_figures(trends: Sequence[Trend]) -> dict[str, dict[str, Figure]]:
     return drawn
 
 
+def dates_around(times_ns: Whole) -> tuple[int, int]:
+    """Ends of an axis that shows all these times; of a single one the day about it."""
+    first, last = int(times_ns.min()), int(times_ns.max())
+    beside = (last - first) // 50 or HALF_DAY_NS
+    return first - beside, last + beside
+
+
 def _batches(trends: Sequence[Trend]) -> list[Sequence[Trend]]:
     return [trends[first : first + PANES] for first in range(0, len(trends), PANES)]
 
@@ -52,6 +61,8 @@ def _figure(trends: Sequence[Trend]) -> Figure:
             locator = dates.AutoDateLocator(minticks=3, maxticks=7)
             panes[-1].xaxis.set_major_locator(locator)
             panes[-1].xaxis.set_major_formatter(dates.ConciseDateFormatter(locator))
+            ends_ns = dates_around(np.concatenate([one.times_ns for one in trends]))
+            panes[-1].set_xlim(*dates.date2num(np.array(ends_ns, "datetime64[ns]")))
         else:
             panes[-1].set_xlabel("log")
             panes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -26,7 +26,7 @@ from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.lifetimes import send_blueprint
 from chladni.viewers.rerun.live_waterfalls import LiveWaterfalls
 from chladni.viewers.rerun.timelines import TIME, log_at, send_scalars, time_index
-from chladni.viewers.style import Style
+from chladni.viewers.style import ON_DARK, Style
 
 #: Seconds of waveform that are seen at a time.
 SCROLL_S: Final = 5.0
@@ -286,7 +286,8 @@ class LiveDrawing:
             path = f"/modes/{mode.number}"
             if mode.number not in self._tracked:
                 self._tracked.add(mode.number)
-                look = rr.SeriesPoints(names=f"mode {mode.number}", marker_sizes=3.0)
+                colour = ON_DARK[(mode.number - 1) % len(ON_DARK)]
+                look = rr.SeriesPoints(names=f"mode {mode.number}", colors=[colour], marker_sizes=3.0)
                 self._recording.log(path, look, static=True)
             if mode.missed == 0:
                 log_at(self._recording, path, mode.last_s, rr.Scalars(mode.frequency_hz))

@@ -16,7 +16,7 @@ from chladni.viewers.rerun.canvas import Canvas, draw_labels
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.restoring_force import spread_over
 from chladni.viewers.style import Colour, amplitude_colours
-from chladni.viewers.torque_maps import load_reach, map_title, maps_over, torque_range, turns_of
+from chladni.viewers.torque_maps import load_reach, map_title, maps_over, motion_name, torque_range, turns_of
 
 WIDTH, HEIGHT, MARGIN = 460.0, 300.0, 0.05
 MEAN_COLOUR: Colour = (255, 255, 255)
@@ -50,7 +50,7 @@ def _draw(recording: rr.RecordingStream, one: TorqueMap, path: str) -> rrb.View:
     low, high = torque_range(one)
     up, y_unit = axis_scale(np.array([low, high]), one.torque_unit)
     canvas = Canvas(width=WIDTH, height=HEIGHT, x_range=_padded(one.motion / across), y_range=(low / up, high / up))
-    canvas.draw_axes(recording, f"{path}/axes", x_name=f"{one.over} [{x_unit}]", y_name=f"torque [{y_unit}]")
+    canvas.draw_axes(recording, f"{path}/axes", x_name=f"{motion_name(one)} [{x_unit}]", y_name=f"torque [{y_unit}]")
     rows = spread_over(one.motion.size)
     # The canvas cuts nothing off: a dot beyond its range would stand among numbers and names.
     rows = rows[(one.torque[rows] >= low) & (one.torque[rows] <= high)]

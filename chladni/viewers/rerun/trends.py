@@ -13,7 +13,7 @@ from chladni.io.atomic import atomic_write
 from chladni.signals.arrays import Whole
 from chladni.signals.trend import Trend
 from chladni.signals.visible import visible
-from chladni.viewers.figures.trends import SECTIONS
+from chladni.viewers.figures.trends import SECTIONS, dates_around
 from chladni.viewers.labels import printed_unit
 from chladni.viewers.rerun.drawing import new_recording
 from chladni.viewers.rerun.entities import folder
@@ -120,11 +120,8 @@ def _axis(trend: Trend) -> rr.blueprint.TimeAxis:
         return rr.blueprint.TimeAxis(
             view_range=rr.TimeRange(start=boundary(seq=0), end=boundary(seq=max(len(trend.logs) - 1, 1)))
         )
-    first, last = int(trend.times_ns[0]), int(trend.times_ns[-1])
-    beside = max((last - first) // 50, 1)
-    return rr.blueprint.TimeAxis(
-        view_range=rr.TimeRange(start=boundary(nanos=first - beside), end=boundary(nanos=last + beside))
-    )
+    first, last = dates_around(trend.times_ns)
+    return rr.blueprint.TimeAxis(view_range=rr.TimeRange(start=boundary(nanos=first), end=boundary(nanos=last)))
 
 
 def _index(trend: Trend, places: Whole | None = None) -> rr.TimeColumn:
