@@ -1,7 +1,5 @@
 """``chladni demo``: the tour on data made on the spot."""
 
-import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +9,7 @@ from chladni.cli import options
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import number, unit, with_error
+from chladni.viewers.display import has_display
 
 if TYPE_CHECKING:
     from chladni.apps.demo import Comparison
@@ -54,13 +53,6 @@ def demo(
         spawn(tour.study)
     else:
         to.line(f"look at it with: chladni view {tour.files[2]} --setup {tour.files[3]} --web")
-
-
-def has_display() -> bool:
-    """Whether a window can be opened here."""
-    if sys.platform in ("win32", "darwin"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def _row(one: "Comparison") -> list[str]:

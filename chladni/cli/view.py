@@ -10,6 +10,7 @@ from chladni.cli import options
 from chladni.cli.logs import log_names
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
+from chladni.viewers.display import has_display, require_display
 
 if TYPE_CHECKING:
     from chladni.signals.study import Study
@@ -43,12 +44,16 @@ def view(
 
     if save is not None and web:
         raise SetupError("--save writes a file and --web serves a page; give one of them")
+    only_window = save is None and not web and report is None and figures is None
     out = Output.of_log(
         [*logs, opener.setup], json=json, figures=figures, report=report, static=static, others={"--save": save}
     )
     opening, studies = opener.among(logs), []
     for title, log in zip(log_names(logs), logs, strict=True):
         with opening(log) as opened, out.progress(title) as progress:
+            if only_window:
+                # Nothing would come of the work.
+                require_display()
             found = analyse(
                 opened,
                 channels=channel,
@@ -80,5 +85,8 @@ def _show(study: "Study", out: Output, *, save: Path | None, web: bool) -> None:
             out.json(lambda: document | {"address": server.address})
             server.wait()
     else:
-        spawn(study)
+        if has_display():
+            spawn(study)
+        else:
+            out.line("No window can be opened here. --save OUT.rrd writes a recording, --web serves a page.")
         out.json(lambda: document)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from chladni.gap.records.diagnosis import PARAMETER, Cause, FittedNumber
+from chladni.gap.records.robot import site_words
 from chladni.models.effects.catalogue import CATALOGUE, spoken_effect
 from chladni.viewers.engineering import engineering
 
@@ -43,7 +44,7 @@ def effect_at(effect: str, site: str) -> str:
     ('a delay at hammer', 'base vibration of the ground', 'a wrong value of elbow.damping')
     """
     joined = "of the" if site == "ground" else "of" if effect == PARAMETER else "at"
-    return f"{effect_name(effect)} {joined} {site}"
+    return f"{effect_name(effect)} {joined} {site_words(site)}"
 
 
 def cause_phrase(cause: Cause) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Closing, Diagnosis, FittedNumber
 from chladni.gap.records.log_use import LogUse
+from chladni.gap.records.robot import site_words
 from chladni.viewers.effect_words import cause_phrase, effect_at, effect_heading
 from chladni.viewers.engineering import chance, engineering, percent
 from chladni.viewers.robot_summary import IN_A_SENTENCE, listed, robot_sentences, robot_unknown
@@ -189,12 +190,12 @@ def _carried(here: Closing, there: Closing) -> str:
 
 
 def _reservations(cause: Cause) -> Iterator[str]:
-    others = [site for site in cause.group if site != cause.site]
+    others = [site_words(site) for site in cause.group if site != cause.site]
     if others:
-        yield f"These sensors can't tell {cause.site} from {listed(others, word='or')}."
+        yield f"These sensors can't tell {site_words(cause.site)} from {listed(others, word='or')}."
     if cause.alternatives:
         told = listed([effect_at(one.effect, one.site) for one in cause.alternatives], word="or")
-        yield f"This log can't tell {effect_heading(cause.effect)} at {cause.site} from {told}."
+        yield f"This log can't tell {effect_heading(cause.effect)} at {site_words(cause.site)} from {told}."
 
 
 def _parameters(found: Diagnosis) -> Iterator[str]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Diagnosis, FittedNumber, Ranked
+from chladni.gap.records.robot import site_words
 from chladni.viewers.effect_words import effect_at, effect_heading
 from chladni.viewers.engineering import chance, engineering, percent, span
 
@@ -178,8 +179,7 @@ def _subject(cause: Cause) -> str:
         return f"all commands of {cause.site}"
     if cause.effect == "gravity_tilt":
         return "the base"
-    # Gears of two joints that run in one another.
-    return cause.site.replace("~", " with ")
+    return site_words(cause.site)
 
 
 #: Friction: what is said of each, with the names of its numbers.

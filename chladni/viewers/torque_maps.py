@@ -17,11 +17,6 @@ def maps_over(found: Diagnosis, over: Over) -> list[TorqueMap]:
     return [one for one in found.torque_maps if one.over == over and one.motion.size]
 
 
-def map_title(one: TorqueMap) -> str:
-    """Site, both joints of a pair by what they share."""
-    return one.site.replace("~", " with ")
-
-
 def motion_name(one: TorqueMap) -> str:
     """What the torque is drawn over: the motion of a joint, or of a pair the sum that its gears make of two."""
     if one.ratio is None:

@@ -2,7 +2,7 @@ import sys
 
 import pytest
 
-from chladni.cli.demo import has_display
+from chladni.viewers.display import DISPLAYS, has_display
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +53,8 @@ def test_a_folder_that_cannot_be_made_is_told(run, tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="displays are told by the environment on Linux only")
 def test_a_display_is_told_by_the_environment(monkeypatch):
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    for name in DISPLAYS:
+        monkeypatch.delenv(name, raising=False)
     assert not has_display()
     monkeypatch.setenv("DISPLAY", ":0")
     assert has_display()

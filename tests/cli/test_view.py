@@ -4,6 +4,7 @@ from types import SimpleNamespace
 import pytest
 
 import chladni.viewers.rerun
+from chladni.viewers.display import DISPLAYS
 from tests.arm import FORCE, TOOL
 
 
@@ -19,6 +20,7 @@ def test_a_recording_is_saved(run, arm_log, tmp_path):
 def test_the_viewer_is_opened(run, arm_log, monkeypatch):
     shown = []
     monkeypatch.setattr(chladni.viewers.rerun, "spawn", shown.append)
+    monkeypatch.setenv("DISPLAY", ":0")
     assert run("view", arm_log, "--channel", TOOL, "--channel", FORCE, "--end", 10).code == 0
     (study,) = shown
     assert [channel.name for channel in study.series[0].channels] == [TOOL, FORCE]
@@ -47,3 +49,23 @@ def test_an_unknown_channel_is_told(run, arm_log, option, tmp_path):
     assert outcome.code == 2
     assert "/no.such" in outcome.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_screen_the_report_is_written_and_the_window_is_told_of(run, arm_log, monkeypatch, tmp_path):
+    for name in DISPLAYS:
+        monkeypatch.delenv(name, raising=False)
+    outcome = run(
+        "view", arm_log, "--channel", TOOL, "--report", tmp_path / "page.html", "--json", tmp_path / "view.json"
+    )
+    assert outcome.code == 0
+    assert (tmp_path / "page.html").is_file()
+    assert (tmp_path / "view.json").is_file()
+    assert "No window can be opened here" in outcome.out
+
+
+def test_without_a_screen_and_a_file_no_work_is_done(run, arm_log, monkeypatch):
+    for name in DISPLAYS:
+        monkeypatch.delenv(name, raising=False)
+    outcome = run("view", arm_log)
+    assert outcome.code != 0
+    assert "--save OUT.rrd" in outcome.err

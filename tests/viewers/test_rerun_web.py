@@ -11,6 +11,7 @@ import psutil
 import pytest
 
 from chladni.signals.errors import SetupError
+from chladni.viewers.display import DISPLAYS
 from chladni.viewers.rerun import WebViewer, process, serve_web, spawn, window
 from tests.viewers import synthetic
 
@@ -67,7 +68,7 @@ def test_a_program_that_never_listens_is_given_up(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_viewer_without_a_display_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+    for name in DISPLAYS:
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(SetupError, match="--save"):
         spawn(synthetic.study())
@@ -79,6 +80,7 @@ def test_a_window_gets_the_study_and_listens_on_loopback_only(monkeypatch: pytes
         return process.start(["--serve-grpc", *options], **others)
 
     monkeypatch.setattr(window, "start", start_server)
+    monkeypatch.setenv("DISPLAY", ":0")
     spawn(synthetic.study())
     shown = window._open_windows.pop()
     assert {ip for ip, _ in listening(shown.pid)} == {"127.0.0.1"}

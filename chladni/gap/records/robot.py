@@ -9,6 +9,17 @@ from chladni.signals.value import Value, require_shape
 Over = Literal["velocity", "position"]
 
 
+def site_words(site: str) -> str:
+    """Say a site: two joints whose gears run in one another by what both are called.
+
+    Examples
+    --------
+    >>> site_words("elbow"), site_words("joint_5~joint_6")
+    ('elbow', 'joint_5 with joint_6')
+    """
+    return site.replace("~", " with ")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointMotion(Value):
     """Positions of a robot's joints, as measured and as simulated from the log's poses, on few samples.

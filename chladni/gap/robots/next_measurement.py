@@ -11,6 +11,7 @@ import numpy as np
 from chladni.gap.calibration import CLOSE, LEAST_SHARE
 from chladni.gap.design.design import Design
 from chladni.gap.records.diagnosis import PARAMETER, Candidate
+from chladni.gap.records.robot import site_words
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.joint_noise import steps_and_noise
 from chladni.gap.robots.search import alternatives
@@ -381,12 +382,12 @@ def _apart_words(doubt: Doubt) -> str:
     if other is None:
         return f"whether there is {_spoken(one)}"
     if one.site == other.site and PARAMETER not in (one.effect, other.effect):
-        return f"{spoken_effect(one.effect)} from {spoken_effect(other.effect)} at {visible(one.site)}"
+        return f"{spoken_effect(one.effect)} from {spoken_effect(other.effect)} at {visible(site_words(one.site))}"
     return f"{_spoken(one)} from {_spoken(other)}"
 
 
 def _spoken(one: Candidate) -> str:
-    site = visible(one.site)
+    site = visible(site_words(one.site))
     return f"another value of {site}" if one.effect == PARAMETER else f"{spoken_effect(one.effect)} at {site}"
 
 

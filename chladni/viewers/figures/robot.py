@@ -10,7 +10,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
 from chladni.gap.records.diagnosis import GapSignals
-from chladni.gap.records.robot import JointMotion, Over, TorqueMap
+from chladni.gap.records.robot import JointMotion, Over, TorqueMap, site_words
 from chladni.signals.arrays import Real
 from chladni.viewers.drawing import thin, with_breaks
 from chladni.viewers.engineering import axis_scale, percent
@@ -20,7 +20,7 @@ from chladni.viewers.figures.sheet import look, plain
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.restoring_force import spread_over
 from chladni.viewers.style import AMPLITUDES, amplitude_colours
-from chladni.viewers.torque_maps import load_reach, map_title, maps_over, motion_name, torque_range, turns_of
+from chladni.viewers.torque_maps import load_reach, maps_over, motion_name, torque_range, turns_of
 
 #: Of a pane that is a third of the sheet wide.
 COLUMNS, HEIGHT_IN, MOST = 3, 1.45, 12
@@ -153,7 +153,7 @@ def _map(axes: Axes, one: TorqueMap) -> None:
         label = "found" if one.is_named else "suggested, not named"
         _broken(axes, one, one.law / up, across, color=AFTER, linewidth=1.2, label=label, zorder=4)
     axes.set_ylim(low / up, high / up)
-    axes.set_title(plain(map_title(one)), loc="left", pad=3, fontsize=7.5)
+    axes.set_title(plain(site_words(one.site)), loc="left", pad=3, fontsize=7.5)
     axes.set_xlabel(plain(f"{motion_name(one)} [{x_unit}]"), labelpad=1)
     axes.set_ylabel(f"[{y_unit}]", labelpad=1)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -46,8 +47,13 @@ LEFT, RIGHT, BAR = 74, 16, 62
 # Room for names inside the top of the frame.
 NAMES_SHARE, UPRIGHT_SHARE = 0.10, 0.22
 SQUARE = 400
-# Words of a legend that find room side by side.
-COLUMNS, SQUARE_COLUMNS = 8, 3
+# Room for a legend, beside what frames it: of a plot that fills two thirds of a narrow page, and of a square one.
+LEGEND_WIDTH, SQUARE_LEGEND_WIDTH = 660, SQUARE - LEFT - RIGHT
+# Height of a word, what lies around it, and so of each further line.
+WORD_HEIGHT, AROUND_WORD = 12, 14
+LEGEND_LINE = WORD_HEIGHT + AROUND_WORD
+# Of a word in it besides its letters: its look, and what lies between.
+MOST_COLUMNS, BESIDE_WORD = 8, 40
 PIXELS_A_LETTER = 5.6
 COLOUR_BAR = "<colorbar>"
 
@@ -150,18 +156,19 @@ def _plot(
     )
     _set_ranges(plot, axes, plots, square=square)
     _dress(plot, axes, figure, numbered=numbered)
+    lines = int(legend)
     # Behind first: what leads lies on top.
     for one in sorted(stacked, key=lambda each: each.get_zorder()):
         target = _target(plot, one, axes, cells=cells)
         draw_artists(one, target)
         if legend and target.items and one is axes:
-            _add_legend(plot, target, columns=SQUARE_COLUMNS if square else COLUMNS)
+            lines = _add_legend(plot, target, width=SQUARE_LEGEND_WIDTH if square else LEGEND_WIDTH)
     bars = _add_bars(plot, axes)
     name = bool(plot.xaxis[0].axis_label)
-    around = TOP + AXIS * numbered + AXIS_NAME * name + TITLE * bool(plot.title.text) + LEGEND * legend
+    around = TOP + AXIS * numbered + AXIS_NAME * name + TITLE * bool(plot.title.text) + _legend_height(lines)
     height = round(_frame_in(figure, axes) * PIXELS_AN_INCH) + around
     if square:
-        plot.width, plot.height = SQUARE, SQUARE
+        plot.width, plot.height = SQUARE, SQUARE + _legend_height(lines) - _legend_height(int(legend))
     else:
         plot.height, plot.sizing_mode = height, "stretch_width"
     if bars:
@@ -323,12 +330,15 @@ def _dressed(axis: Any) -> Any:
     return axis
 
 
-def _add_legend(plot: Any, target: Target, *, columns: int) -> None:
+def _add_legend(plot: Any, target: Target, *, width: float) -> int:
+    """Put the legend above the frame, in as many lines as its words need; say how many."""
+    longest = max(len(str(item.label["value"])) for item in target.items) * PIXELS_A_LETTER + BESIDE_WORD
+    columns = min(len(target.items), MOST_COLUMNS, max(int(width / longest), 1))
     plot.add_layout(
         Legend(
             items=target.items,
             orientation="horizontal",
-            ncols=min(len(target.items), columns),
+            ncols=columns,
             click_policy="hide",
             background_fill_alpha=0.0,
             border_line_color=None,
@@ -338,12 +348,17 @@ def _add_legend(plot: Any, target: Target, *, columns: int) -> None:
             margin=0,
             location="left",
             glyph_width=16,
-            label_height=12,
-            spacing=14,
-            glyph_height=12,
+            label_height=WORD_HEIGHT,
+            spacing=AROUND_WORD,
+            glyph_height=WORD_HEIGHT,
         ),
         "above",
     )
+    return ceil(len(target.items) / columns)
+
+
+def _legend_height(lines: int) -> int:
+    return LEGEND + LEGEND_LINE * (lines - 1) if lines else 0
 
 
 def _add_bars(plot: Any, axes: Axes) -> bool:

@@ -16,6 +16,7 @@ import rerun as rr
 
 from chladni.signals.errors import LogError
 from chladni.signals.live_state import LiveState
+from chladni.viewers.display import require_display
 from chladni.viewers.rerun.drawing import APPLICATION
 from chladni.viewers.rerun.lifetimes import end_unused_streams
 from chladni.viewers.rerun.live import LiveDrawing, rehearse
@@ -226,6 +227,8 @@ class Viewer(Target):
     what = "the viewer"
 
     def __init__(self, *, web: bool = False) -> None:
+        if not web:
+            require_display()
         data_port, page_port = free_port(), free_port()
         options = ["--port", str(data_port), "--memory-limit", VIEWER_MEMORY]
         ports = [data_port]

@@ -7,7 +7,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from chladni.gap.records.diagnosis import Diagnosis
-from chladni.gap.records.robot import Over, TorqueMap
+from chladni.gap.records.robot import Over, TorqueMap, site_words
 from chladni.signals.arrays import Real
 from chladni.signals.visible import visible
 from chladni.viewers.engineering import axis_scale
@@ -16,7 +16,7 @@ from chladni.viewers.rerun.canvas import Canvas, draw_labels
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.restoring_force import spread_over
 from chladni.viewers.style import Colour, amplitude_colours
-from chladni.viewers.torque_maps import load_reach, map_title, maps_over, motion_name, torque_range, turns_of
+from chladni.viewers.torque_maps import load_reach, maps_over, motion_name, torque_range, turns_of
 
 WIDTH, HEIGHT, MARGIN = 460.0, 300.0, 0.05
 MEAN_COLOUR: Colour = (255, 255, 255)
@@ -36,7 +36,7 @@ def draw_torque_maps(recording: rr.RecordingStream, found: Diagnosis, over: Over
     parts = [views[start : start + TOGETHER] for start in range(0, len(views), TOGETHER)]
     if len(parts) == 1:
         return [rrb.Grid(*views, name=name)]
-    titles = [map_title(one) for one in maps]
+    titles = [site_words(one.site) for one in maps]
     grids = []
     for place, part in enumerate(parts):
         first = place * TOGETHER
@@ -71,7 +71,7 @@ def _draw(recording: rr.RecordingStream, one: TorqueMap, path: str) -> rrb.View:
     # In a row above the frame: titles of views are cut off where there are many.
     places = np.column_stack([WIDTH * np.array(LEGEND[: len(told)]), np.full(len(told), -ABOVE)])
     draw_labels(recording, f"{path}/legend", places, [text for text, _ in told], colours=[paint for _, paint in told])
-    return canvas.view(path, f"{map_title(one)} [{y_unit}]", above=3 * ABOVE)
+    return canvas.view(path, f"{site_words(one.site)} [{y_unit}]", above=3 * ABOVE)
 
 
 def _padded(x: Real) -> tuple[float, float]:

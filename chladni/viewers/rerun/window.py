@@ -7,6 +7,7 @@ from subprocess import Popen
 import rerun as rr
 
 from chladni.signals.study import Study
+from chladni.viewers.display import require_display
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.rerun.drawing import draw
 from chladni.viewers.rerun.gap import draw_gap
@@ -34,6 +35,7 @@ def spawn_gap(evidence: GapEvidence) -> None:
 
 
 def _open(drawn: Callable[[rr.RecordingStream], None]) -> None:
+    require_display()
     port = free_port()
     _open_windows.append(start(["--port", str(port)], ports=[port], detached=True, settle_s=SETTLE_S))
     send(drawn, port)

@@ -8,7 +8,7 @@ from bokeh.models import ColumnDataSource, FixedTicker, GlyphRenderer, Label, Le
 from matplotlib.figure import Figure
 
 from chladni.viewers.figures.upright import name_above
-from chladni.viewers.interactive.plots import translated
+from chladni.viewers.interactive.plots import LEGEND_LINE, SQUARE, translated
 
 
 def test_upright_names_stand_at_their_frequencies() -> None:
@@ -51,3 +51,18 @@ def test_a_word_in_the_legend_without_a_curve_shows_its_look() -> None:
         source = renderer.data_source
         assert isinstance(source, ColumnDataSource)
         assert len(source.data["x"])
+
+
+@pytest.mark.parametrize(("name", "columns"), [("/imu/payload_rail.accel.linear.z", 1), ("tip", 3)])
+def test_a_square_plot_has_as_many_lines_for_its_legend_as_the_names_need(name: str, columns: int) -> None:
+    figure = Figure()
+    axes = figure.subplots()
+    axes.set_aspect("equal")
+    for row in range(3):
+        axes.plot([0.0, 1.0], [0.0, row], label=f"{name}{row}")
+    axes.legend()
+    (plot, *_), *_ = translated(figure, cells=1).grid.children
+    [legend] = plot.above
+    assert legend.ncols == columns
+    # The frame below stays a square of the same size.
+    assert plot.height - SQUARE == LEGEND_LINE * (3 // columns - 1)
