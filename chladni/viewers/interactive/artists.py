@@ -59,8 +59,8 @@ class Target:
         Most cells of an image.
     dates
         Whether the x axis is one of dates.
-    items, columns
-        Of the legend; and by the identity of a line its source and column, where several share one.
+    items, words, columns
+        Of the legend, and its words; by the identity of a line its source and column, where several share one.
     """
 
     plot: Any
@@ -71,6 +71,7 @@ class Target:
     cells: int
     dates: bool = False
     items: list[LegendItem] = field(default_factory=list)
+    words: list[str] = field(default_factory=list)
     columns: dict[int, tuple[ColumnDataSource, str]] = field(default_factory=dict)
 
     def up(self, y: ArrayLike) -> Real:
@@ -96,6 +97,7 @@ class Target:
         renderer.name = colour
         label = str(artist.get_label())
         if label and not label.startswith("_"):
+            self.words.append(label)
             self.items.append(LegendItem(label={"value": inert(label)}, renderers=[renderer]))
 
 

@@ -332,7 +332,7 @@ def _dressed(axis: Any) -> Any:
 
 def _add_legend(plot: Any, target: Target, *, width: float) -> int:
     """Put the legend above the frame, in as many lines as its words need; say how many."""
-    longest = max(len(str(item.label["value"])) for item in target.items) * PIXELS_A_LETTER + BESIDE_WORD
+    longest = max(len(word) for word in target.words) * PIXELS_A_LETTER + BESIDE_WORD
     columns = min(len(target.items), MOST_COLUMNS, max(int(width / longest), 1))
     plot.add_layout(
         Legend(
