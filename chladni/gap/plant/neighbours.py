@@ -6,7 +6,7 @@ from typing import Protocol, Self
 from chladni.gap.calibration import KEPT, STEP
 from chladni.gap.plant.kept import Kept
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.effects.pair import unlinked_pairs, with_pair_ports
+from chladni.models.effects.pair import PairPorts, unlinked_pairs
 from chladni.signals.arrays import Real
 
 
@@ -49,7 +49,8 @@ class Neighbours:
     def __init__(self, model: Varied, tunables: Scaled) -> None:
         self._model, self._tunables = model, tunables
         # Where bodies share no joint the model may lack one. Which do is the same at all numbers.
-        self._pairs = unlinked_pairs(model.compile())
+        compiled = model.compile()
+        self._pairs = PairPorts(compiled, unlinked_pairs(compiled))
         self._at: Kept[CompiledModel] = Kept(KEPT)
         self._changed: Kept[tuple[CompiledModel, ...]] = Kept(KEPT)
 
@@ -70,4 +71,4 @@ class Neighbours:
         return tuple(self._linked(base.with_values({name: there[name]})) for name in self._tunables.names)
 
     def _linked(self, model: Varied) -> CompiledModel:
-        return with_pair_ports(model.compile(), self._pairs)
+        return self._pairs.of(model.compile())

@@ -58,32 +58,52 @@ def with_pair_port(compiled: CompiledModel, name: str) -> tuple[CompiledModel, i
 
 def with_pair_ports(compiled: CompiledModel, names: Sequence[str]) -> CompiledModel:
     """Give the model with a new port for each of some pairs of bodies; errors are those of `with_pair_port`."""
-    if not names:
-        return compiled
-    weights, ports = np.zeros((len(names), len(compiled.ports))), []
-    for row, name in enumerate(names):
-        ends = _ends(compiled, name)
-        for sign, place in ends:
-            weights[row, place] = sign
-        shown = [compiled.ports[place] for _, place in ends]
-        _require_alike(name, shown)
-        last = shown[-1]
-        ports.append(Port(name=name, kind="pair", unit=last.unit, displacement_unit=last.displacement_unit))
-    # What acts at the pair acts at its bodies, against their displacements' signs.
-    displacement_port = np.column_stack([compiled.displacement_port, -compiled.displacement_port @ weights.T])
-    velocity_port = np.column_stack([compiled.velocity_port, -compiled.velocity_port @ weights.T])
-    return replace(
-        compiled,
-        g=np.column_stack([compiled.g, -compiled.g @ weights.T]),
-        h=np.column_stack([compiled.h, -compiled.h @ weights.T]),
-        displacement_state=np.vstack([compiled.displacement_state, weights @ compiled.displacement_state]),
-        displacement_column=np.vstack([compiled.displacement_column, weights @ compiled.displacement_column]),
-        displacement_port=np.vstack([displacement_port, weights @ displacement_port]),
-        velocity_state=np.vstack([compiled.velocity_state, weights @ compiled.velocity_state]),
-        velocity_column=np.vstack([compiled.velocity_column, weights @ compiled.velocity_column]),
-        velocity_port=np.vstack([velocity_port, weights @ velocity_port]),
-        ports=(*compiled.ports, *ports),
-    )
+    return PairPorts(compiled, names).of(compiled)
+
+
+class PairPorts:
+    """Ports of some pairs of bodies, laid out once for a model of any numbers; errors are those of `with_pair_port`.
+
+    Parameters
+    ----------
+    compiled
+        The model at some of its numbers.
+    names
+        Of the pairs.
+    """
+
+    def __init__(self, compiled: CompiledModel, names: Sequence[str]) -> None:
+        weights, ports = np.zeros((len(names), len(compiled.ports))), []
+        for row, name in enumerate(names):
+            ends = _ends(compiled, name)
+            for sign, place in ends:
+                weights[row, place] = sign
+            shown = [compiled.ports[place] for _, place in ends]
+            _require_alike(name, shown)
+            last = shown[-1]
+            ports.append(Port(name=name, kind="pair", unit=last.unit, displacement_unit=last.displacement_unit))
+        self._weights, self._ports = weights, tuple(ports)
+
+    def of(self, compiled: CompiledModel) -> CompiledModel:
+        """Give the model at other numbers with these ports, behind its own."""
+        if not self._ports:
+            return compiled
+        weights = self._weights
+        # What acts at the pair acts at its bodies, against their displacements' signs.
+        displacement_port = np.hstack([compiled.displacement_port, -compiled.displacement_port @ weights.T])
+        velocity_port = np.hstack([compiled.velocity_port, -compiled.velocity_port @ weights.T])
+        return replace(
+            compiled,
+            g=np.hstack([compiled.g, -compiled.g @ weights.T]),
+            h=np.hstack([compiled.h, -compiled.h @ weights.T]),
+            displacement_state=np.vstack([compiled.displacement_state, weights @ compiled.displacement_state]),
+            displacement_column=np.vstack([compiled.displacement_column, weights @ compiled.displacement_column]),
+            displacement_port=np.vstack([displacement_port, weights @ displacement_port]),
+            velocity_state=np.vstack([compiled.velocity_state, weights @ compiled.velocity_state]),
+            velocity_column=np.vstack([compiled.velocity_column, weights @ compiled.velocity_column]),
+            velocity_port=np.vstack([velocity_port, weights @ velocity_port]),
+            ports=(*compiled.ports, *self._ports),
+        )
 
 
 def unlinked_pairs(compiled: CompiledModel) -> tuple[str, ...]:
