@@ -8,6 +8,7 @@ from chladni.io.convert import convert
 from tests.arm import FORCE, write_arm
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_note_is_told_once_and_with_its_log_when_it_holds_for_one(tmp_path):
     arm = write_arm(tmp_path)

@@ -68,6 +68,7 @@ def test_functions_give_what_their_log_gives(arm):
     )
 
 
+@pytest.mark.nightly
 def test_modes_are_given_finer_lines_than_a_spectrum_for_the_eye(arm):
     modes = identify_modes(arm, references=FORCE)
     assert modes.provenance.segment_s > 1.9 * frf(arm, references=FORCE).provenance.segment_s
@@ -90,6 +91,7 @@ def test_bands_are_fitted_one_by_one_and_joined(arm, truth):
     assert_near_truth(modes, truth, floor=0.01)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_one_band_and_a_count_and_given_frequencies_limit_what_is_found(arm, truth):
     within = identify_modes(arm, references=FORCE, band_hz=(15, 57))
@@ -104,6 +106,7 @@ def test_named_responses_only(arm):
     assert [channel.name for channel in modes.channels] == [TOOL, WRIST]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", [CircleFit(), PolyReferenceLeastSquares(max_order=30)])
 def test_methods_for_functions(arm, truth, method):
     modes = identify_modes(arm, references=FORCE, method=method)
@@ -185,6 +188,7 @@ def test_a_hammer_drives_modes_as_far_as_its_force_stays_within_20_db():
         assert not any("20 dB down" in note for note in further.provenance.notes)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_motion_as_reference_holds_its_point_still(arm, truth):
     def warnings(modes):
@@ -195,6 +199,7 @@ def test_a_motion_as_reference_holds_its_point_still(arm, truth):
     assert not warnings(identify_modes(arm))
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_modes_that_nobody_asked_for_are_no_misfit(arm):
     everything, first = identify_modes(arm), identify_modes(arm, count=1)
@@ -202,6 +207,7 @@ def test_modes_that_nobody_asked_for_are_no_misfit(arm):
     assert first.fit.error == pytest.approx(everything.fit.error, rel=1e-9)
 
 
+@pytest.mark.nightly
 def test_an_excitation_that_was_not_measured_does_not_hide_heavily_damped_modes():
     # Half of the motion is due to the force at the other end: single fine lines are nothing but noise.
     model = made.chain(damping=0.06)

@@ -132,6 +132,7 @@ def test_sizes_that_no_estimator_can_square_are_one_line(
     assert not (folder / "o.json").exists()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("size", [pytest.param(1e-200, marks=pytest.mark.nightly), 1e153])
 def test_a_diagnosis_says_nothing_else(folder: Path, size: float) -> None:
     # As a program of its own: compiled libraries write to standard output themselves.

@@ -125,6 +125,7 @@ def test_a_generator_that_there_is_not_is_one_line(run: Run, tmp_path: Path) -> 
     assert not (tmp_path / "campaign").exists()
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_make_writes_cases_and_truths(run: Run, tmp_path: Path) -> None:
     done = run("blind", "make", tmp_path, "--count", 1, "--seed", 2, "--jobs", 1, "--json", "-")

@@ -24,6 +24,7 @@ def test_the_same_log_twice_has_not_changed(run, arm_log):
     assert "nothing that scatter doesn't explain" in outcome.err
 
 
+@pytest.mark.nightly
 def test_a_louder_channel_is_found_and_the_others_are_not(run, arm_log, louder_log):
     outcome = run("compare", arm_log, louder_log, "--json", "-")
     levels = {level["channel"]: level for level in outcome.document["levels"]}
@@ -60,6 +61,7 @@ def test_a_long_list_of_changes_is_cut_with_a_word(run, monkeypatch):
     assert told == [("Peaks: 2 of 5 changes, all of them with --json", 2)]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_modes_of_both_are_compared_when_asked_for(run, arm_log, tmp_path):
     from tests.arm import write_arm

@@ -167,6 +167,7 @@ def test_info_tells_kind_clock_and_samples(run: Run, file: tuple[Path, tuple[obj
         assert channel["rate_hz"] == pytest.approx(RATE_HZ, rel=1e-6)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "file",
     [kind if kind == "table.csv" else pytest.param(kind, marks=pytest.mark.nightly) for kind in KINDS],

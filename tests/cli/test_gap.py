@@ -274,6 +274,7 @@ def test_a_simulated_log_takes_the_place_of_a_model(run: Run, files: tuple[Path,
     assert "tuned" not in outcome.err
 
 
+@pytest.mark.nightly
 def test_several_levels_are_compared_each_with_its_simulation(
     run: Run, files: tuple[Path, Path], tmp_path: Path
 ) -> None:

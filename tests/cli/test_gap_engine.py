@@ -44,6 +44,7 @@ def diagnosed(run: Run, files: tuple[Path, Path], target: object, *more: object)
     return outcome
 
 
+@pytest.mark.nightly
 def test_a_sensor_that_shows_too_much_is_named_and_the_model_written_with_it(
     run: Run, files: tuple[Path, Path], tmp_path: Path
 ) -> None:

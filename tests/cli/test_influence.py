@@ -81,6 +81,7 @@ def test_an_unstable_model_is_told(run: Run, model: Path, tmp_path: Path) -> Non
     assert "unstable" not in run("influence", model).out
 
 
+@pytest.mark.nightly
 def test_figures_are_written(run: Run, tmp_path: Path) -> None:
     outcome = run("influence", "pneumatic-motor", "--figures", tmp_path / "figures")
     assert outcome.code == 0, outcome.err

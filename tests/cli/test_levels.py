@@ -81,6 +81,7 @@ def test_people_get_tables_and_a_table_for_spreadsheets(run, log, tmp_path):
     assert float(second["0 to 2500 Hz peak_to_peak"]) == pytest.approx(6.0 * np.cos(np.deg2rad(18)))
 
 
+@pytest.mark.nightly
 def test_figures_and_report_are_saved_where_asked(run, log, tmp_path):
     outcome = run(
         "levels", log, "--machine", "medium-rigid", "--figures", tmp_path / "f", "--report", tmp_path / "r.html"

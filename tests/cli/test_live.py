@@ -26,6 +26,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "arm.mcap"
 
 
+@pytest.mark.nightly
 def test_a_finished_log_ends_by_its_footer_with_everything_written(run: Run, arm: Path, tmp_path: Path) -> None:
     found = run(
         "live", arm, "--save", tmp_path / "a.rrd", "--json", "-", "--report", tmp_path / "a.html", "--resolution", "2"

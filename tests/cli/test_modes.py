@@ -60,6 +60,7 @@ def test_people_get_a_table_with_error_bars_and_advice(run, arm_log):
     assert "driving point" in outcome.out
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_band_count_and_frequency_choose(run, arm_log, truth):
     def frequencies(*options):
@@ -79,6 +80,7 @@ def test_other_methods(run, arm_log, truth, method):
     assert np.all(np.abs(found[:, None] / truth.frequency_hz - 1).min(axis=1) < 0.03)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_files_are_written(run, arm_log, tmp_path):
     paths = {name: tmp_path / f"modes.{name}" for name in ("uff", "csv", "rrd", "html")}

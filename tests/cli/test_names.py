@@ -129,6 +129,7 @@ def written(pair: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -
     return tmp_path_factory.mktemp("wild"), tmp_path_factory.mktemp("plain")
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("pair", [write_log, pytest.param(write_table, marks=pytest.mark.nightly)], indirect=True)
 def test_every_command_prints_and_writes_harmless_names(

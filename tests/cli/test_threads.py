@@ -25,6 +25,7 @@ def program(folder: Path, threads: int, *command: object) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "threads"),

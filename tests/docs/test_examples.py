@@ -27,6 +27,13 @@ def test_an_effect_of_ones_own_is_named() -> None:
 
 
 @pytest.mark.nightly
+def test_friction_is_named_among_the_whole_catalogue() -> None:
+    command = [sys.executable, EXAMPLES / "what_a_model_forgot.py"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert re.search(r"Most likely Coulomb friction of [78]\.[0-9].* at elbow", said)
+
+
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("example", "answer"),
     [

@@ -211,6 +211,7 @@ def test_streams_of_other_grids_are_not_compared_with_each_other(
     assert compared.call_count < streams
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is read from /proc")
 def test_samples_of_many_fields_are_held_once(tmp_path: Path) -> None:
     """Pieces of the log go as their samples are laid out; of the process, since pages count when written to."""

@@ -159,6 +159,7 @@ def error_of(robot: Robot, motion: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.diag(np.linalg.inv(whole.T @ whole)) / truth**2)))
 
 
+@pytest.mark.nightly
 def test_the_same_seed_gives_the_same(tmp_path: Path) -> None:
     robot = planar(tmp_path)
     one, same, other = (chladni.excite(robot, seed=seed).coefficients for seed in (1, 1, 2))
@@ -166,6 +167,7 @@ def test_the_same_seed_gives_the_same(tmp_path: Path) -> None:
     assert not np.allclose(one, other)
 
 
+@pytest.mark.nightly
 def test_what_a_description_leaves_open_is_told(tmp_path: Path) -> None:
     made = chladni.excite(written(tmp_path, URDF, "arm.urdf"), speed=1.0)
     assert any(text.startswith("elbow: no stops in the description; at most 1.57 rad") for text in made.remarks)

@@ -291,6 +291,7 @@ def test_nothing_at_all_is_drawn_as_nothing() -> None:
     assert gap_album(gap_evidence(bare)).figures == {}
 
 
+@pytest.mark.nightly
 def test_the_sheet_is_the_same_bytes_every_time(evidence: GapEvidence) -> None:
     assert rendered(gap_sheet(evidence), "png") == rendered(gap_sheet(evidence), "png")
 

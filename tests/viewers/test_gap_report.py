@@ -84,6 +84,7 @@ def test_the_page_tells_how_much_of_each_log_was_used_and_which_is_shown() -> No
     assert "arm.mcap: 8 s at 500 Hz" in unfiled
 
 
+@pytest.mark.nightly
 def test_captions_promise_nothing_where_nothing_is_named() -> None:
     told = " ".join(Page(gap_report_html(gap_evidence(made.unknown()))).texts)
     assert "with the best parameters" in told
@@ -128,6 +129,7 @@ def test_the_file_is_the_page(tmp_path: Path) -> None:
     assert path.read_text(encoding="utf-8") == gap_report_html(bare, album=NO_FIGURES)
 
 
+@pytest.mark.nightly
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium; on Debian: apt install chromium")
 def test_a_browser_shows_it_on_any_screen(arm: str, tmp_path: Path) -> None:

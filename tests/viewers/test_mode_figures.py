@@ -111,6 +111,7 @@ def single_channel() -> Study:
     )
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_no_picture_is_blank_or_cut_off_and_no_text_lies_on_another() -> None:
     for name, figure in various().items():
@@ -197,6 +198,7 @@ def test_three_hundred_channels_without_places_are_named_here_and_there() -> Non
     drawn(figure)
 
 
+@pytest.mark.nightly
 def test_many_modes_are_divided_evenly() -> None:
     study = made.plate_study(3, 2, 20)
     found = mode_shape_figures(study)

@@ -98,6 +98,7 @@ def test_no_view_of_any_page_complains(arm: HeadlessViewer, page: str) -> None:
     assert arm.complaints() == []
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_bars_without_places_are_shown(tmp_path: Path) -> None:
     with headless_viewer(write_rrd(made.without_geometry(), tmp_path / "bars.rrd")) as viewer:

@@ -100,6 +100,7 @@ def test_names_and_notes_are_text() -> None:
     assert "/<script>alert(1)</script>.x" in page.texts
 
 
+@pytest.mark.nightly
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium; on Debian: apt install chromium")
 def test_a_browser_shows_it_without_requests_on_any_screen(arm: str, tmp_path: Path) -> None:

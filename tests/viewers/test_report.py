@@ -225,6 +225,7 @@ def test_print_has_dark_ink_whatever_the_screen(browser: Any, arm: str, tmp_path
     page.close()
 
 
+@pytest.mark.nightly
 def test_a_report_of_envelopes_lists_its_channels_and_tells_of_a_bearing_where_there_is_one() -> None:
     noise = np.random.default_rng(4).standard_normal(8192)
     (spectrum,) = envelope(noise, band_hz=(100, 300), sample_rate_hz=1000.0)

@@ -73,6 +73,7 @@ def test_names_that_try_to_break_the_viewer_do_not(tmp_path: Path) -> None:
         assert viewer.complaints() == []
 
 
+@pytest.mark.nightly
 def test_peak_of_the_density_stands_under_the_cursor_at_its_frequency(tmp_path: Path) -> None:
     density = synthetic.density()
     only = replace(density, values=density.values[3:], std=density.std[3:], channels=density.channels[3:])
@@ -92,6 +93,7 @@ def test_peak_of_the_density_stands_under_the_cursor_at_its_frequency(tmp_path: 
     assert abs(int(rows.argmin()) - cursor) <= 3
 
 
+@pytest.mark.nightly
 def test_deflection_shape_moves_with_the_cursor_and_rests_outside_the_band(arm: HeadlessViewer) -> None:
     arm.show("Frequency responses")
     pictures = {}

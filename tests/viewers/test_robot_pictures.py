@@ -129,6 +129,7 @@ def test_a_long_log_makes_no_large_file(file: Path) -> None:
     assert file.stat().st_size < 2_000_000
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not HAS_VULKAN, reason="no Vulkan driver to draw with")
 def test_the_viewer_shows_all_pages_without_complaint(file: Path) -> None:
     with headless_viewer(file) as viewer:

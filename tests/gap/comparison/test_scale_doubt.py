@@ -81,12 +81,14 @@ def test_a_free_axis_in_another_unit_is_told_first(
     assert found.startswith(f"At position the model as it is gives {times}")
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_free_axis_in_its_own_units_is_not_doubted(tmp_path: Path, shared_data: Path) -> None:
     found = emps(tmp_path, shared_data)
     assert "unit" not in found
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_mass_a_thousand_times_too_small_is_told(tmp_path: Path, shared_data: Path) -> None:
     found = emps(tmp_path, shared_data, mass="0.095")

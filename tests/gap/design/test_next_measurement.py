@@ -68,6 +68,7 @@ def test_what_is_expected_of_the_log_is_what_the_contest_found():
     assert 0.3 * found < expected < found + np.sqrt(2 * found) + 3
 
 
+@pytest.mark.nightly
 def test_coulomb_against_viscous_friction_asks_for_another_level_or_less_noise():
     arguments = contested(COULOMB, acting("coulomb_friction", "j1", force=0.3), wrong("j1.damping"))
     search = Search(*arguments, seed=1)
@@ -78,6 +79,7 @@ def test_coulomb_against_viscous_friction_asks_for_another_level_or_less_noise()
     assert search.best()[0].change in ("level", "repeats")
 
 
+@pytest.mark.nightly
 def test_an_input_against_the_only_sensor_asks_for_a_sensor(hammer_or_sensor):
     search = Search(*hammer_or_sensor, seed=1)
     designs = search.best()

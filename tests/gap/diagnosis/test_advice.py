@@ -83,6 +83,7 @@ def test_a_diagnosis_asks_for_what_tells_its_candidates_apart() -> None:
     assert said.startswith("Add ")
 
 
+@pytest.mark.nightly
 def test_two_causes_are_compared_with_those_without_one() -> None:
     study = studied(log_of(gain("a0"), HARDENING))
     both, single, alone = entered(study, (gain("a0"), HARDENING), (gain("a0"),), (HARDENING,))
@@ -99,6 +100,7 @@ def test_two_causes_are_compared_with_those_without_one() -> None:
     assert measure_next(study, believing(study, causes.tuned, [causes.best, *far]), seed=0) is None
 
 
+@pytest.mark.nightly
 def test_nothing_missing_in_loud_noise_says_what_may_be_hidden() -> None:
     loud, quiet = studied(log_of(noise=1.0)), studied(log_of())
     said = measure_next(loud, answered(loud, [], "none"), seed=0) or ""
@@ -108,6 +110,7 @@ def test_nothing_missing_in_loud_noise_says_what_may_be_hidden() -> None:
     assert measure_next(quiet, answered(quiet, [], "none"), seed=0) is None
 
 
+@pytest.mark.nightly
 def test_an_effect_in_loud_noise_asks_for_a_higher_level() -> None:
     study = studied(log_of(attached("gain_error", "a0", {"gain": 3.0}), noise=1.0))
     # So large that nothing else comes near.
@@ -116,6 +119,7 @@ def test_an_effect_in_loud_noise_asks_for_a_higher_level() -> None:
     assert "unseen" not in said
 
 
+@pytest.mark.nightly
 def test_an_only_sensor_is_asked_for_another_one(hardening: Study, hardening_of_one: Study) -> None:
     study = hardening_of_one
     causes = answered(study, entered(study, (HARDENING,)))

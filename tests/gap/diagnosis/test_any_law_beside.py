@@ -28,6 +28,7 @@ def beside(effect: AttachedEffect, *, words: set[str], seconds: float = 5.0) -> 
     return causes.verdict, any_law(study, causes, causes_named(study, causes))
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_law_that_took_no_part_is_seen_to_follow_the_motion() -> None:
     spring = chladni.attached("hardening_stiffness", "hand", {"cubic": 3e10})

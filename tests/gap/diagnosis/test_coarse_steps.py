@@ -30,6 +30,7 @@ def rounded(cut):
     return replace(log, outputs=outputs), step, float(np.std(outputs[1] - log.outputs[1]))
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_only_the_steps_are_named() -> None:
     log, step, _ = rounded(np.round)
@@ -38,6 +39,7 @@ def test_only_the_steps_are_named() -> None:
     assert found.causes[0].parameters["step"].value == pytest.approx(step)
 
 
+@pytest.mark.nightly
 def test_the_floor_holds_what_rounding_takes() -> None:
     log, step, taken = rounded(np.floor)
     study = study_of(machine(), log, leave_out=frozenset(), own={})

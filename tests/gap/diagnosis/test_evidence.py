@@ -66,6 +66,7 @@ def test_of_two_forces_each_is_the_one_that_acts_at_its_site(both: Study) -> Non
     assert missed(alone.force, true_force(both, "elbow", FRICTION, SPRING)) > 2.0
 
 
+@pytest.mark.nightly
 def test_two_forces_that_two_sensors_cannot_tell_apart_are_not_tried(both: Study) -> None:
     few = studied(FRICTION, SPRING, off={}, outputs=["acc_column", "acc_wrist"])
     assert [one.site.name for one in evidence(few, believing(few), named(SPRING, FRICTION))] == ["hand"]
@@ -84,6 +85,7 @@ def test_where_nothing_is_named_it_is_the_best_place(both: Study) -> None:
     assert evidence(both, believing(both), named(chladni.attached("delay", "knee", {"delay": 1e-3}))) == ()
 
 
+@pytest.mark.nightly
 def test_a_wrong_stiffness_shows_as_the_spring_that_its_joint_lacks() -> None:
     study = studied(off={"elbow.stiffness": 1.5})
     names = study.contest.run.tunables.names

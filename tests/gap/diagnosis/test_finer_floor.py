@@ -38,6 +38,7 @@ def answer(study, left):
     return replace(found, fit=missed)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_noise_behind_a_cause_is_told_where_it_hid_something(rubbing) -> None:
     outputs = rubbing.measurement.outputs
@@ -51,6 +52,7 @@ def test_the_noise_behind_a_cause_is_told_where_it_hid_something(rubbing) -> Non
     assert np.all(finer.rms <= rubbing.contest.noise.rms)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_clipped_sensor_s_distortion_is_not_in_the_floor_that_is_told(rubbing) -> None:
     found = rubbing.contest.enter(hypothesis_of((RUB,), rubbing.location.tuned.z))
@@ -65,6 +67,7 @@ def test_a_clipped_sensor_s_distortion_is_not_in_the_floor_that_is_told(rubbing)
     assert finer.rms[2] == pytest.approx(noise, rel=0.15)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_nothing_new_is_told_where_nothing_was_named_or_only_noise_is_left(rubbing) -> None:
     nothing = answer(rubbing, np.zeros_like(rubbing.measurement.outputs))
@@ -73,6 +76,7 @@ def test_nothing_new_is_told_where_nothing_was_named_or_only_noise_is_left(rubbi
     assert finer_floor(rubbing, plain) is None
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_another_round_is_held_over_the_floor_that_was_told(rubbing) -> None:
     finer = over_floor(rubbing, rubbing.contest.noise.lowered(np.array([1.0, 1.0, 0.01])))

@@ -10,6 +10,7 @@ from chladni.models.effects.catalogue import CATALOGUE
 from tests.gap.made_log import band_noise, measured, three_bodies
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "words",

@@ -197,6 +197,7 @@ def test_no_effect_where_only_parameters_are_off(seed):
     assert found.gap.tuned < 1.1 * found.gap.noise < found.gap.before
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @among_few()
 def test_a_parameter_far_beyond_its_tolerance_is_named(out):

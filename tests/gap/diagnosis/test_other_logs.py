@@ -31,6 +31,7 @@ def answer():
     return causes_found(study, [].append)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_another_log_closes_and_one_on_which_the_model_diverges_is_told(answer):
     study, causes = answer
@@ -43,6 +44,7 @@ def test_another_log_closes_and_one_on_which_the_model_diverges_is_told(answer):
     assert sentence.startswith("absurd.mcap: the model diverges there")
 
 
+@pytest.mark.nightly
 def test_a_floor_that_shakes_says_nothing_of_other_logs(answer):
     study, causes = answer
     assert tried_elsewhere(study, replace(causes, shaken=object()), [study.measurement], seed=0) == ((), ())

@@ -53,6 +53,7 @@ def two_sensors(*effects: AttachedEffect, words: frozenset[str]):
     return study_of(machine, log, leave_out=frozenset(CATALOGUE) - words, own={})
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "first",
     [
@@ -114,6 +115,7 @@ def study() -> Study:
     return study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
 
 
+@pytest.mark.nightly
 def test_the_leading_place_is_paired_with_those_that_were_not_followed(study: Study) -> None:
     first = study.location.ranked[0]
     pairs = located_pairs(replace(study.location, ranked=(first,)))

@@ -33,6 +33,7 @@ def test_a_stribeck_curve_that_falls_slowly_isnt_lost_to_coulombs() -> None:
     assert best.fit.effects[0].values["speed"] == pytest.approx(1.0, rel=0.2)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_stribeck_curve_hands_on_to_the_coulomb_friction_that_it_ends_at() -> None:
     log = measured((chladni.attached("coulomb_friction", "elbow", {"force": 5.0}),), noise=0.005)
@@ -49,6 +50,7 @@ def test_a_stribeck_curve_hands_on_to_the_coulomb_friction_that_it_ends_at() -> 
     assert search._relatives() == []
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_ripple_of_the_joint_that_an_input_acts_across_may_be_the_inputs() -> None:
     # An unknown force is band-limited: only an input that is, too, prints the same between samples.

@@ -28,6 +28,7 @@ def shaken() -> tuple[Study, Contestant]:
     return studied(FLOOR)
 
 
+@pytest.mark.nightly
 def test_a_floor_that_shakes_is_told_with_the_joint_that_it_acts_through(shaken) -> None:
     study, tuned = shaken
     found = shaken_by(study, tuned)
@@ -40,12 +41,14 @@ def test_a_floor_that_shakes_is_told_with_the_joint_that_it_acts_through(shaken)
     assert found.parameters["band"].value == pytest.approx(150.0, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_what_the_model_alone_tells_better_than_other_sensors_is_no_floor(shaken) -> None:
     study, tuned = shaken
     near = replace(tuned, fit=replace(tuned.fit, outputs=study.measurement.outputs))
     assert shaken_by(study, near) is None
 
 
+@pytest.mark.nightly
 def test_where_a_force_on_another_body_does_as_well_no_floor_is_told(shaken) -> None:
     study, tuned = shaken
     ground, first, second, *others = study.location.ranked

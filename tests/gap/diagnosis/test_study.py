@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from chladni.gap.diagnosis.study import study_of
 from tests.gap.arm import arm, measured
 
 
+@pytest.mark.nightly
 def test_a_sensor_that_holds_its_samples_is_noticed_and_a_clipped_one_is_not() -> None:
     log = measured(seconds=2.0)
     outputs = log.outputs.copy()
@@ -17,6 +19,7 @@ def test_a_sensor_that_holds_its_samples_is_noticed_and_a_clipped_one_is_not() -
     assert study.repeating == (log.output_names[1],)
 
 
+@pytest.mark.nightly
 def test_a_few_long_holds_are_noticed() -> None:
     log = measured(seconds=2.0)
     outputs = log.outputs.copy()

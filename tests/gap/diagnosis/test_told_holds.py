@@ -78,7 +78,14 @@ def told(nominal, log, tunables):
 
 
 # Every hold with every excitation, twenty times each, is a matter of the night.
-@pytest.mark.parametrize(("hold", "kind"), list(zip(HOLDS, EXCITATIONS, strict=True)))
+@pytest.mark.parametrize(
+    ("hold", "kind"),
+    [
+        pytest.param("zoh", "multisine", marks=pytest.mark.nightly),
+        ("foh", "low-passed"),
+        pytest.param("band_limited", "sweep", marks=pytest.mark.nightly),
+    ],
+)
 def test_the_hold_of_a_machine_with_nothing_missing(hold, kind):
     """What drives the machine is what drove it: told from the log, or as it is by default."""
     assert (told(*made(hold, kind, 0.01, 1)) or DEFAULT) == hold
@@ -104,7 +111,7 @@ def test_twenty_machines_of_each_kind(hold, kind, noise):
     "effect",
     [
         pytest.param(("added_mass", "b1", {"mass": 0.8}), marks=pytest.mark.nightly),
-        ("hardening_stiffness", "j1", {"cubic": 3e12}),
+        pytest.param(("hardening_stiffness", "j1", {"cubic": 3e12}), marks=pytest.mark.nightly),
         pytest.param(("coulomb_friction", "j1", {"force": 20.0}), marks=pytest.mark.nightly),
         # Not by half a sample, which another hold does as well.
         ("delay", "hammer", {"delay": 3.0 / RATE_HZ}),
@@ -117,6 +124,7 @@ def test_what_is_missing_is_no_hold(effect, hold, seed):
     assert found in {hold, None}
 
 
+@pytest.mark.nightly
 def test_a_hold_that_the_model_states_is_not_asked_about():
     nominal, log, tunables = made("zoh", "multisine", 0.01, 1)
     stated = nominal.with_holds({"hammer": "foh"})

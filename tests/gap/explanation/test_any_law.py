@@ -78,6 +78,7 @@ def test_a_stiffness_that_turns_with_a_shaft_is_followed() -> None:
     assert left_at(shaft, "shoulder") < 0.12
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("word", "values"),
@@ -87,6 +88,7 @@ def test_what_an_actuator_does_with_the_command_is_followed(word: str, values: d
     assert left_at(chladni.attached(word, "shaker", values), "shaker") < 0.12
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["shoulder", pytest.param("ground", marks=pytest.mark.nightly)])
 def test_a_floor_that_shakes_follows_nothing(name: str) -> None:

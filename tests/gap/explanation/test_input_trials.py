@@ -12,6 +12,7 @@ from chladni.gap.plant.tunable import Tunables
 from tests.gap.made_log import WORDS, band_noise, measured, three_bodies
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "words",
     [

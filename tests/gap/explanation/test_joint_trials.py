@@ -113,6 +113,7 @@ def test_bristles_that_bend_within_a_sample_are_found():
     assert found["force"] == pytest.approx(20.0, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_a_round_contact_is_a_stop_and_no_spring_that_hardens_to_one_side():
     values = {"stiffness": 6e4, "clearance": 1.5e-3, "depth": 1e-3, "dissipation": 0.3}
     contact = attached("one_sided_stop", "j0", values, variant="hertz_damper")

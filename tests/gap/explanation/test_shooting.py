@@ -50,6 +50,7 @@ def test_teeth_whose_run_is_lost_from_a_near_start_are_found_over_windows(made) 
     assert dict(shot.fit.effects[0].values) == pytest.approx(TEETH, rel=0.02)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_windows_grow_as_long_as_the_run_follows(made) -> None:
     _, shooting = made
@@ -60,6 +61,7 @@ def test_windows_grow_as_long_as_the_run_follows(made) -> None:
     assert shooting.shot(near(2.0)).misfit > 10.0
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_run_of_one_end_only_is_entered_where_windows_led() -> None:
     softly = attached("ripple", "j0", {**TEETH, "amplitude": 3.0})

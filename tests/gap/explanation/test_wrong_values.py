@@ -54,6 +54,7 @@ def test_of_two_slips_the_second_is_found_beside_the_first() -> None:
     assert both.screened < 0.01 * one.screened
 
 
+@pytest.mark.nightly
 def test_where_all_values_are_right_none_is_doubted() -> None:
     location, tunables = located({})
     assert wrong_values(location, tunables) == []

@@ -40,6 +40,7 @@ def tuned(model, log, floor, **options):
     return fit_output_error(run, floor, start_z=start, **options)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (0, 2, 3))])
 def test_a_random_chain_is_tuned_to_its_noise(seed):

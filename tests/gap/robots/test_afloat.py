@@ -52,6 +52,7 @@ def test_filters_of_an_imu_are_no_cause(tmp_path: Path) -> None:
     assert left.std() < 0.1 * (torques.missing - right).std()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("falls", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_a_robot_that_is_right_lacks_nothing(tmp_path: Path, falls: bool) -> None:
     found = found_of(tmp_path, falls=falls)
@@ -106,6 +107,7 @@ def test_without_an_imu_the_joints_tell_nothing(tmp_path: Path) -> None:
         diagnose_robot(robot, log)
 
 
+@pytest.mark.nightly
 def test_what_stands_is_refused_with_the_time_in_the_air(tmp_path: Path) -> None:
     robot = biped(tmp_path)
     with pytest.raises(LogError, match="held by its base, its legs in the air"):
@@ -127,6 +129,7 @@ def turned(log: JointLog) -> JointLog:
     return replace(log, imu=replace(log.imu, angular_velocity=felt[0], linear_acceleration=felt[1]))
 
 
+@pytest.mark.nightly
 def test_an_imu_that_is_turned_is_named(tmp_path: Path) -> None:
     robot = biped(tmp_path)
     found = diagnose_robot(robot, turned(hung(robot, walking(SECONDS))))

@@ -219,6 +219,7 @@ def test_a_word_may_be_left_out_at_one_site(tmp_path: Path) -> None:
     assert sites == [{"shoulder", "elbow"}, {"shoulder"}, set()]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 2))])
 def test_damping_that_a_machine_has_none_of_is_a_wrong_value(tmp_path: Path, seed: int) -> None:
     machine = tmp_path / "machine" / "arm.xml"

@@ -41,10 +41,7 @@ LAWS = {
 # How each is read, test_forward holds for all of them.
 @pytest.mark.parametrize(
     "word",
-    [
-        word if word in ("dead_zone", "joint_elasticity") else pytest.param(word, marks=pytest.mark.nightly)
-        for word in LAWS
-    ],
+    [word if word == "dead_zone" else pytest.param(word, marks=pytest.mark.nightly) for word in LAWS],
 )
 def test_a_law_is_named_with_its_number(word: str, tmp_path: Path) -> None:
     change, name, value = LAWS[word]
@@ -56,6 +53,7 @@ def test_a_law_is_named_with_its_number(word: str, tmp_path: Path) -> None:
     assert found.gap.after < 0.5 * found.gap.before
 
 
+@pytest.mark.nightly
 def test_elasticity_is_told_where_the_log_reads_the_motor(tmp_path: Path) -> None:
     robot, command = arm(tmp_path), commands(SECONDS)
     machine = changed(as_described(robot), 0, transmission=motor(stiffness=400.0, logs_motor=True))
@@ -117,6 +115,7 @@ def read(machine: Machine, command: np.ndarray) -> np.ndarray:
     return STEP * np.rint(course(machine, command) / STEP)
 
 
+@pytest.mark.nightly
 def test_a_push_is_told_with_its_joint_and_time(tmp_path: Path) -> None:
     robot, command = arm(tmp_path), commands(SECONDS)
     time_s = np.arange(command.shape[1]) / RATE_HZ

@@ -60,6 +60,7 @@ def motion_of(said: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> np.nd
         return np.asarray(log.read().values[:2])
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("truth", ["coulomb_friction", pytest.param("viscous_friction", marks=pytest.mark.nightly)])
 def test_the_motion_that_is_advised_tells_what_was_open(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, truth: str
@@ -98,6 +99,7 @@ def test_a_motion_is_laid_out_as_a_log_that_lacks_nothing(tmp_path: Path, by_eff
     np.testing.assert_allclose(more.missing - laid.missing, 0.7, atol=0.01)
 
 
+@pytest.mark.nightly
 def test_what_is_sure_needs_no_further_motion(tmp_path: Path) -> None:
     robot = arm(tmp_path)
     late = np.roll(commands(12.0), 3, axis=1)
@@ -107,6 +109,7 @@ def test_what_is_sure_needs_no_further_motion(tmp_path: Path) -> None:
     assert diagnosed(arm(tmp_path), arm(tmp_path), at_one_speed()).next_measurement is None
 
 
+@pytest.mark.nightly
 def test_what_no_motion_tells_is_one_answer(tmp_path: Path) -> None:
     machine = arm(tmp_path, "machine/arm.xml", mass="1.3")
     said = diagnosed(arm(tmp_path), machine, at_one_speed(4.0, 0.3)).next_measurement or ""

@@ -40,6 +40,7 @@ def scatter(colour: tuple[float, ...], coloured: bool) -> float:
     return float(np.sqrt(np.mean(np.square(list(fits(colour, coloured))))))
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("colour", [pytest.param(WHITE, marks=pytest.mark.nightly), SLOW, RINGING])
 def test_spreads_are_those_of_many_logs(colour: tuple[float, ...]) -> None:

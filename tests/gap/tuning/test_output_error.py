@@ -91,10 +91,11 @@ def test_a_start_at_rest_is_not_taken_for_motion(signals):
             attached("time_offset", "a1", {"offset": 1e-5}),
             ["offset"],
         ),
-        (
+        pytest.param(
             attached("saturation", "hammer", {"limit": 100.0}),
             attached("saturation", "hammer", {"limit": 150.0}),
             ["limit"],
+            marks=pytest.mark.nightly,
         ),
     ],
     ids=lambda each: each.effect if hasattr(each, "effect") else None,

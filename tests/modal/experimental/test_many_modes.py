@@ -48,6 +48,7 @@ def test_all_of_many_modes_are_found_and_no_other(response, model):
     assert modes.fit.bands_hz.shape == (30, 2)
 
 
+@pytest.mark.nightly
 def test_groups_give_what_a_fit_of_all_gives(response, model, participation):
     assert model.poles.size > ALONE
     parts = grouped_refinement(response, model.poles, participation, max_iterations=15)

@@ -224,6 +224,7 @@ def test_many_responses_are_taken_in_chunks(monkeypatch):
     np.testing.assert_allclose(polyreference_poles(lively, max_order=20, order_step=5).pole, whole.pole, rtol=1e-8)
 
 
+@pytest.mark.nightly
 def test_orders_are_counted_down_from_the_highest():
     response = functions(chain(), FREQUENCY_HZ, references=("m1", "m2", "m3"), noise=0.01)
     table = polyreference_poles(response, max_order=23, min_order=4, order_step=5)

@@ -133,6 +133,7 @@ def test_noise_has_no_modes(samples, references, responses, resolution_hz):
         assert modes.stabilisation is not None
 
 
+@pytest.mark.nightly
 def test_as_much_noise_as_signal_hides_no_mode():
     for seed in range(4):
         modes = IDENTIFY(chain_response(seed, cycles=2000, noise=1.0, force_noise=0.0, resolution_hz=0.01))
@@ -293,6 +294,7 @@ def test_aircraft(shared_data, level, expected):
     assert any("chi-square" in note for note in modes.provenance.notes)
 
 
+@pytest.mark.nightly
 def test_hammer(shared_data):
     with chladni.open_log(shared_data / "hammer.mcap") as log:
         modes = IDENTIFY(chladni.frf(log, references="/daq.hammer"), band_hz=(200.0, 3500.0))

@@ -52,6 +52,7 @@ def test_sharp_peaks_between_few_lines(method):
     np.testing.assert_allclose(modes.damping_ratio, [0.001], rtol=1e-4)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.003, pytest.param(0.03, marks=pytest.mark.nightly)])
 def test_error_bars_cover_the_truth(method, noise):

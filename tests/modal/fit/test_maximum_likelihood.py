@@ -192,6 +192,7 @@ def binomial_limits(trials):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("make", "at", "runs", "options"),
     [

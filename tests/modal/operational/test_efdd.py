@@ -20,6 +20,7 @@ def mac(one, other):
     return abs(np.vdot(one, other)) ** 2 / (np.vdot(one, one) * np.vdot(other, other)).real
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_long_record_of_a_chain_gives_what_responses_alone_can():
     truth = chain()

@@ -16,6 +16,7 @@ def series_of(*rows, rate_hz=100.0, valid=None):
     return TimeSeries(values=np.stack(rows), sample_rate_hz=rate_hz, channels=channels, valid=valid)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("samples", [16, 32, 128])
 @pytest.mark.parametrize("chance", [1e-2, 1e-3])
 def test_the_chance_of_a_low_kurtosis_is_never_understated(samples, chance):

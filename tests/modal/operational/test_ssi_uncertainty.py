@@ -85,6 +85,7 @@ def test_frequency_and_damping_move_as_the_pole_does():
     np.testing.assert_allclose(moved.damping_ratio[:, 0], damping, rtol=1e-5)
 
 
+@pytest.mark.nightly
 def test_the_scatter_of_records_is_what_the_error_bars_say():
     truth = chain()
     results, bars = [], []

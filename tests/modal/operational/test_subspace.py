@@ -290,6 +290,7 @@ def test_few_block_rows_limit_the_order():
     assert found.frequency_hz.size == 5
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_building_shows_its_published_modes(shared_data):
     log = chladni.open_log(shared_data / "palisaden.mcap")

@@ -49,6 +49,7 @@ def test_cancelling_leaves_two_lags():
     np.testing.assert_allclose(velocity, 1 - (1 + time / lag) * np.exp(-time / lag), atol=1e-7)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("zeta", [0.02, 0.1, 0.2, 0.4])
 def test_no_other_correction_near_it_settles_sooner(zeta):
     best = best_pd2(omega=1.0, damping_ratio=zeta)

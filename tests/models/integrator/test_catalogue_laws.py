@@ -89,6 +89,7 @@ def by_radau(compiled, signal):
     return np.array(found).T[:n]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("name", named(SHARP))
 def test_sharp_laws_agree_over_ten_cycles(name):

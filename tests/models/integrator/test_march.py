@@ -60,6 +60,7 @@ def test_order_of_each_scheme_by_regression(name, scheme, order):
     assert order - 0.4 <= slope <= order + 1.5
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
@@ -74,6 +75,7 @@ def test_smooth_laws_agree_with_scipy_over_fifty_cycles(name):
     assert systems.relative_rms(found, truth) <= 1e-5
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",

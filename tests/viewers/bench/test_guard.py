@@ -147,6 +147,7 @@ def test_the_page_has_no_script_of_its_own(port: int) -> None:
     assert "<title>Oscillator &lt;one body&gt; · chladni</title>" in body
 
 
+@pytest.mark.nightly
 def test_there_are_no_more_pages_than_there_may_be(server: Any, port: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chladni.viewers.bench.guard.MOST_PAGES", 3)
     with ExitStack() as held:
@@ -270,16 +271,22 @@ BUFFER = wire.frame(b'{"id": "a"}')
     [
         [wire.frame(LONG)],
         pytest.param([wire.frame(LONG, wire.BINARY)], marks=pytest.mark.nightly),
-        [wire.frame(LONG[:500_000], last=False)] + [wire.frame(LONG[:500_000], 0, last=False)] * 5,
+        pytest.param(
+            [wire.frame(LONG[:500_000], last=False)] + [wire.frame(LONG[:500_000], 0, last=False)] * 5,
+            marks=pytest.mark.nightly,
+        ),
         pytest.param([wire.frame(b"", length=1 << 62)], marks=pytest.mark.nightly),
         pytest.param(
             [*wire.message({}, buffers=10**9), *[BUFFER, wire.frame(LONG[:900_000], wire.BINARY)] * 3],
             marks=pytest.mark.nightly,
         ),
-        [*wire.message({}, buffers=10**9), *[BUFFER, wire.frame(b"", wire.BINARY)] * 6000],
+        pytest.param(
+            [*wire.message({}, buffers=10**9), *[BUFFER, wire.frame(b"", wire.BINARY)] * 6000],
+            marks=pytest.mark.nightly,
+        ),
         [*wire.message({})[:2], wire.frame(b"[" * 1_000_000)],
         pytest.param([wire.frame(b"[]")] * 3, marks=pytest.mark.nightly),
-        [wire.frame(b"\xff\xfe")],
+        pytest.param([wire.frame(b"\xff\xfe")], marks=pytest.mark.nightly),
         pytest.param([wire.frame(b"x", wire.BINARY)], marks=pytest.mark.nightly),
         pytest.param(wire.message({}, kind="NONSENSE"), marks=pytest.mark.nightly),
     ],
@@ -413,6 +420,7 @@ def test_a_page_of_another_origin_gets_nothing_in_a_browser(server: Any, port: i
         assert page.goto(f"http://evil.example:{port}/{NAME}").status == 403
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_a_link_from_another_page_leads_to_the_bench(server: Any, port: int) -> None:
     text = f'<!doctype html><a href="{own(port)}/{NAME}">the motor</a>'
@@ -426,6 +434,7 @@ def test_a_link_from_another_page_leads_to_the_bench(server: Any, port: int) -> 
         page.locator(".noUi-handle").first.wait_for()
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_a_full_bench_opens_the_page_once_there_is_room(
     server: Any, port: int, monkeypatch: pytest.MonkeyPatch
@@ -440,6 +449,7 @@ def test_a_full_bench_opens_the_page_once_there_is_room(
         assert server.open_pages == 2
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_a_page_works_under_both_names_without_a_word_of_the_browser(port: int) -> None:
     with browsing() as page:

@@ -264,6 +264,7 @@ def test_the_model_file_is_saved_with_the_values_on_the_page(page: Any) -> None:
     assert Path(saved.value.path()).read_text() == "mass = 4.0"
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_reset_goes_back(page: Any) -> None:
     before = curves(page)
@@ -298,6 +299,7 @@ CHARTS_JS = """() => {
 }"""
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_charts_keep_their_axes_when_what_stands_above_them_grows(page: Any) -> None:
     """Style and messages come after the first layout."""
@@ -312,6 +314,7 @@ def test_charts_keep_their_axes_when_what_stands_above_them_grows(page: Any) -> 
     assert abs(page.evaluate(CHARTS_JS)["height"] - before) <= 1
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_dark_ground(page: Any) -> None:
     page.get_by_text("dark", exact=True).click()
@@ -324,6 +327,7 @@ def test_dark_ground(page: Any) -> None:
     assert set(fills) == {"#1a2028"}
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_a_dark_screen_gets_the_dark_page_unless_the_address_asks_for_the_light_one(page: Any, address: str) -> None:
     own = address.split()[0] + "oscillator"
@@ -338,6 +342,7 @@ def test_a_dark_screen_gets_the_dark_page_unless_the_address_asks_for_the_light_
         page.emulate_media(color_scheme="light")
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_rows_of_a_file_appear_while_it_grows(browser: Any, address: str, rows: Path) -> None:
     page = open_page(browser, address.split()[1])

@@ -101,6 +101,7 @@ def test_every_draft_moves_the_outputs_the_more_the_larger(word, footing):
         assert change(small) < 1.02 * change(middle)
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("short")
 @pytest.mark.parametrize("kind", ["effect", "faint"])
 def test_an_effect_has_the_severity_that_was_asked_for(kind):
@@ -143,6 +144,7 @@ def test_a_case_with_three_effects_has_each_at_its_own_site():
     assert min(case.ratios_tuned) >= 1.0
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("short")
 @pytest.mark.parametrize(
     ("rule", "refused", "accepted"),

@@ -99,6 +99,7 @@ def case():
     return draw_case(Order(kind="effect", words=("hysteresis",)), np.random.default_rng(7))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("share", "opens"), [(0.5, True), (1.5, True), (2.5, False), (20.0, False)])
 def test_a_loop_opens_where_half_of_its_yield_is_moved(case, share, opens):
     (loop,) = case.effects

@@ -337,6 +337,7 @@ IN_DRIVE = [
 ]  # fmt: skip
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("drive_word", ["pneumatic-motor", "hydraulic-motor", "dc-servo"])
 @pytest.mark.parametrize(
     ("law", "part", "hidden", "effect", "values", "more"), IN_DRIVE, ids=[o[0] for o in IN_DRIVE]

@@ -46,6 +46,7 @@ def campaign(tmp_path_factory):
     return directory
 
 
+@pytest.mark.nightly
 def test_users_load_cases(campaign):
     for case in case_folders(campaign):
         model = chladni.load_model(campaign / "cases" / case.name / "model.toml")
@@ -58,6 +59,7 @@ def test_users_load_cases(campaign):
         assert set(truth["off"]) <= set(model.parameters)
 
 
+@pytest.mark.nightly
 def test_the_command_reads_a_log_of_this_kind(campaign):
     log = case_folders(campaign)[0].log
     done = subprocess.run([sys.executable, "-m", "chladni", "info", str(log), "--json", "-"], capture_output=True)
@@ -95,6 +97,7 @@ def stated(case, tmp_path):
     return {name: (parameter.value, parameter.tolerance) for name, parameter in model.parameters.items()}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", EACH_KIND)
 def test_numbers_are_inside_their_tolerances_but_those_that_are_told(kind, tmp_path):
     case = drawn(kind)
@@ -130,6 +133,7 @@ def test_a_truth_says_what_its_kind_says(kind):
             assert 3 <= effect.severity_tuned <= effect.severity * 1.001
 
 
+@pytest.mark.nightly
 def test_a_clean_logs_noise_is_what_was_asked_for():
     for index in range(1, 5):
         case = draw_case(SEED, index, "none")
@@ -223,6 +227,7 @@ def test_with_true_numbers_a_held_log_leaves_its_noise_alone(tmp_path):
         np.testing.assert_allclose(left_over_noise(case, outputs, slice(None)), 1.0, rtol=0.03)
 
 
+@pytest.mark.nightly
 def test_with_true_numbers_a_band_limited_log_leaves_its_noise_alone(tmp_path):
     over = 16
     for case in from_rest("band_limited", 1):

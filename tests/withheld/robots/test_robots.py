@@ -63,6 +63,7 @@ def test_every_description_is_a_robot_of_six_to_twelve_joints(name):
     assert pin.buildModelFromXML(robot.urdf).nv == robot.model.nv
 
 
+@pytest.mark.nightly
 def test_work_of_the_motors_is_the_energy_of_the_links():
     _, stage = staged(1)
     motion, model = stage.quiet, stage.scene.machine.model
@@ -73,6 +74,7 @@ def test_work_of_the_motors_is_the_energy_of_the_links():
     assert_allclose(work, stored - stored[0], atol=0.02 * np.ptp(stored))
 
 
+@pytest.mark.nightly
 def test_a_base_that_floats_obeys_mechanics_and_its_imu_feels_it():
     _, stage = staged(21, floats=True)
     motion, machine = stage.quiet, stage.scene.machine
@@ -144,6 +146,7 @@ def test_friction_takes_energy_and_never_gives_any():
     assert np.sum(np.minimum(power, 0.0)) > -0.05 * np.sum(np.maximum(power, 0.0))
 
 
+@pytest.mark.nightly
 def test_friction_and_payload_of_the_truth_are_found_by_regression():
     rng, stage = staged(3)
     scene = stage.scene
@@ -176,6 +179,7 @@ def test_friction_and_payload_of_the_truth_are_found_by_regression():
     assert np.all(without[others].std(axis=1) < 0.02 * motion.given[others].std(axis=1))
 
 
+@pytest.mark.nightly
 def test_a_delay_shifts_what_the_servo_follows():
     rng, stage = staged(4)
     cause = ALL_CAUSES["common_delay"](rng, stage, 0)
@@ -187,6 +191,7 @@ def test_a_delay_shifts_what_the_servo_follows():
     assert np.median(np.abs(followed - commands.values[:, late])) < 2e-3
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "word",
     [word if word in ONE_OF_EACH_KIND else pytest.param(word, marks=pytest.mark.nightly) for word in ALL_CAUSES],
