@@ -12,7 +12,7 @@ from scipy.linalg import qr
 from scipy.optimize import NonlinearConstraint, minimize
 from scipy.special import logsumexp, softmax
 
-from chladni.robots.dynamics import needed_torque
+from chladni.robots.dynamics import motion_torque, needed_torque
 from chladni.robots.loading import load_robot
 from chladni.robots.motion_limits import UNIT, MotionLimits, Shares, effort_limit, motion_limits, moved_joints
 from chladni.robots.robot import Robot, RobotJoint
@@ -264,13 +264,21 @@ class _Search:
         """Look along a motion."""
         return self._look(self._motion(x, self._fine if fine else self._coarse))
 
+    def _whole(self, motion: Real) -> Real:
+        """``[3, dof, sample]``: position, velocity and acceleration of all."""
+        found = np.zeros((3, self._robot.model.nv, motion.shape[2]))
+        found[0] = self._limits.start[:, None]
+        found[:, self._dofs] += motion
+        return found
+
+    def _torque(self, motion: Real) -> Real:
+        """``[dof, sample]``."""
+        torque = motion_torque(self._robot, *self._whole(motion))
+        torque[self._dofs] += self._friction[self._dofs, None] * np.sign(motion[1])
+        return torque
+
     def _look(self, motion: Real) -> _Seen:
-        still = np.zeros((self._robot.model.nv, motion.shape[2]))
-        moving = [still + self._limits.start[:, None], still, still.copy()]
-        for all_dofs, own in zip(moving, motion, strict=True):
-            all_dofs[self._dofs] += own
-        position, velocity, acceleration = moving
-        need = needed_torque(self._robot, position, velocity, acceleration)
+        need = needed_torque(self._robot, *self._whole(motion))
         links = np.moveaxis(need.regressor[self._dofs], 1, 0)
         sign = np.tanh(motion[1] / (_SLOW * self._speed[:, None]))
         laws = [np.einsum("mk,mn->kmn", own, np.eye(len(self._moved))) for own in (sign, motion[1], motion[2])]
@@ -299,7 +307,7 @@ class _Search:
         most = self._limits.torque[self._bounded, None]
 
         def over(share: float) -> bool:
-            torque = self._look(self._motion(share * x, basis)).torque
+            torque = self._torque(self._motion(share * x, basis))
             return bool(np.any(np.abs(torque[self._bounded]) > (1.0 - _BETWEEN) * most))
 
         low, high = 0.0, 1.0
@@ -391,13 +399,13 @@ class _Search:
         time_s = np.mod(np.arange(samples) / rate_hz, 1.0 / self._series.base_frequency_hz)
         position, velocity, acceleration = np.einsum("jh,dhk->djk", coefficients, self._series.basis(time_s))
         position += self._limits.start[:, None]
-        look = self._look(np.stack([position - self._limits.start[:, None], velocity, acceleration])[:, self._dofs])
+        motion = np.stack([position - self._limits.start[:, None], velocity, acceleration])[:, self._dofs]
         return Trajectory(
             robot=self._robot.name, joints=joints, moved=tuple(one.name for one in self._moved),
             sample_rate_hz=rate_hz, position=position[rows], velocity=velocity[rows], acceleration=acceleration[rows],
-            torque=look.torque[rows], base_frequency_hz=self._series.base_frequency_hz,
+            torque=self._torque(motion)[rows], base_frequency_hz=self._series.base_frequency_hz,
             harmonics=self._series.harmonics, coefficients=coefficients[rows],
-            use=self._use(x, self.seen(x, fine=True).torque),
+            use=self._use(x, self._torque(self._motion(x, self._fine))),
         )  # fmt: skip
 
     def _use(self, x: Real, torque: Real) -> tuple[JointUse, ...]:

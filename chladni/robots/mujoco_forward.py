@@ -310,11 +310,11 @@ class _Run:
         places, dofs, kp, laws, between = self._places, self._dofs, self._kp, self._laws, self._between
         ahead = np.ascontiguousarray(self._forward[:, span].T)
         path = np.full_like(ahead, np.nan)
-        bound, carry = self._bound(), self._carried(span)
+        bound, carry, is_soft = self._bound(), self._carried(span), between.any
         for place in range(len(ahead)):
             carry(place)
             position, velocity = qpos[places], qvel[dofs]
-            if between.any:
+            if is_soft:
                 path[place] = between.logged(position)
                 turned, turning = between.motor(position, velocity)
                 torque = bound(ahead[place] - kp * turned, turning)

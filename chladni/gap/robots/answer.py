@@ -26,7 +26,7 @@ from chladni.gap.records.diagnosis import (
     Where,
 )
 from chladni.gap.robots.contest import Contest, Fit
-from chladni.gap.robots.forward import Confirmed, confirmed, machine_of
+from chladni.gap.robots.forward import Confirmed, Trial, machine_of
 from chladni.gap.robots.next_measurement import next_measurement
 from chladni.gap.robots.pictures import joint_motion, torque_maps, torque_signals
 from chladni.gap.robots.pushes import Push
@@ -106,10 +106,9 @@ class Answer:
     @cached_property
     def _confirmed(self) -> tuple[tuple["Weighed", ...], Confirmed | None, Confirmed | None]:
         """The names with which positions are simulated no worse than without, that simulation, and any run."""
-        named, first = self._suggested, None
+        named, first, trial = self._suggested, None, Trial(torques=self.solved.torques)
         while True:
-            best = self._contest.fit([one.term for one in named])
-            found = confirmed(Solved(contest=self._contest, best=best))
+            found = trial.of([one.term for one in named])
             if found is None or not np.all(np.isfinite([found.before, found.tuned, found.after])):
                 return named, None, found
             first = first or found
@@ -139,7 +138,7 @@ class Answer:
             if one not in self.named and one.gain > TEMPER and one.is_felt
             for row in one.acts
         }
-        left = self._contest.over_rounding(np.array([one.energy for one in self._best.left]))
+        left = self._contest.over_rounding(self._best.left.energy)
         beyond = np.flatnonzero((self._contest.unknowns(self._best) > TEMPER) & (left > 1.0))
         named = {row for one in self.named for row in one.acts}
         return tuple(sorted({*beyond.tolist(), *(doubted - named)}))
@@ -280,7 +279,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
         for one, part in zip(others[1:], weight[3:], strict=True)
         if one.terms[-1].word in words and one.terms[-1] in near
     )
-    lost = np.array([one.energy for one in rest.left]) - np.array([one.energy for one in best.left])
+    lost = rest.left.energy - best.left.energy
     # What tolerances take over when they're stretched is felt, too.
     strained = rest.strain - best.strain
     shares = contest.shares(best, place)
@@ -397,14 +396,13 @@ def _of_torques(solved: Solved, named: Sequence[Term]) -> Closing:
     torques = solved.torques
     judge = _every_other(torques.missing.shape[1])
     there = torques.moving & judge
-    apart = Contest(torques, taking_part=~judge)
-    chosen = apart.same(named)
+    apart = Contest(torques, taking_part=~judge, terms=named)
     scale = np.resize(_usual(torques), len(torques.missing))[:, None]
 
     def left(part: Real) -> float:
         return float(np.sqrt(np.mean((((torques.missing - part) / scale)[there]) ** 2)))
 
-    tuned, full = (left(apart.explained(apart.fit(one))) for one in ((), chosen))
+    tuned, full = (left(apart.explained(apart.fit(one))) for one in ((), named))
     noise = np.broadcast_to(torques.noise[:, None] / scale, there.shape)[there]
     return _closing(
         left(np.zeros_like(torques.missing)), tuned, full, float(np.sqrt(np.mean(noise**2))), named=bool(named),

@@ -5,13 +5,15 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import comb, log, log1p
+from math import comb, log
 
 import numpy as np
+from scipy.linalg.lapack import dtrtrs
 from scipy.optimize import nnls
 
-from chladni.gap.calibration import ANOTHER, DETAILS, ELSEWHERE, QUARTER, USUAL
+from chladni.gap.calibration import ANOTHER, DETAILS, QUARTER
 from chladni.gap.records.diagnosis import PARAMETER
+from chladni.gap.robots.joints_left import JointsLeft
 from chladni.gap.robots.row import Row, columns_of_rows
 from chladni.gap.robots.term import FOUND, Term
 from chladni.gap.robots.tolerances import tolerances
@@ -19,67 +21,9 @@ from chladni.gap.robots.torques import RIGHT, Torques
 from chladni.gap.robots.words import all_terms
 from chladni.signals.arrays import Index, Mask, Real
 
-#: Share by which the noise of a torque is known.
-_DOUBT = 0.3
 #: Information over the prior's: what a log tells less of stays where it's believed.
 _UNTOLD = 1e-3
 _ROUNDS, _NEAR = 8, 3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JointLeft:
-    """What a fit leaves at a joint, as whitened energy; noise alone leaves `count`.
-
-    Attributes
-    ----------
-    energy, count
-        Left, and expected of noise alone.
-    force
-        Energy that the joint's own laws and limits of its drive explain: these idealise a part of it. None without
-        any, infinite for a torque of any shape.
-    """
-
-    energy: float
-    count: float
-    force: float | None
-
-    @property
-    def over_noise(self) -> float:
-        """Energy over the noise's."""
-        return self.energy / max(self.count, 1.0)
-
-    @property
-    def beyond(self) -> float:
-        """Energy beyond the noise's."""
-        return max(self.energy - self.count, 0.0)
-
-    @property
-    def log_likelihood(self) -> float:
-        """Nats, by the evidence of every diagnosis (`Left`).
-
-        What is left beyond the noise is worth few numbers as far as it's the usual detail of the joint's own laws,
-        and many beyond. Where one ends the other begins as flat, so that there's one best fit.
-        """
-        # The square of a real number costs half of a complex line's; of the noise's own level little is told.
-        beyond, doubted = self.beyond / 2.0, _DOUBT * self.count / 2.0
-        told = beyond**2 / (beyond + doubted) if beyond > 0 else 0.0
-        inside = min(told, self._usual)
-        nats = DETAILS * log1p(inside / DETAILS)
-        if told > inside:
-            nats += ELSEWHERE * log1p((told - inside) / (ELSEWHERE * (1.0 + inside / DETAILS)))
-        return -nats
-
-    @property
-    def _usual(self) -> float:
-        return 0.0 if self.force is None else USUAL**2 * self.force / 2.0
-
-    @property
-    def weight(self) -> float:
-        """Times that a unit of energy costs as much as of noise alone."""
-        beyond = self.beyond / 2.0
-        inside = min(beyond, self._usual)
-        flat = 1.0 + inside / DETAILS
-        return 1.0 / (flat + (beyond - inside) / ELSEWHERE)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,11 +34,11 @@ class Fit:
     ----------
     terms
         The set.
-    numbers, covariance
+    numbers, root
         ``[number]`` of the tolerances first, which `Contest.tolerances` reads, then of the terms, over their scales;
-        and their covariance.
+        and the lower triangular root of their information ``[number, number]``.
     left
-        ``[joint]``: what is left at each.
+        What is left at each joint.
     nats
         Evidence and prior.
     within
@@ -105,11 +49,17 @@ class Fit:
 
     terms: tuple[Term, ...]
     numbers: Real
-    covariance: Real
-    left: tuple[JointLeft, ...]
+    root: Real
+    left: JointsLeft
     nats: float
     within: int
     weight: Real
+
+    @property
+    def covariance(self) -> Real:
+        """``[number, number]``: of the numbers."""
+        inverse = _solved(self.root, np.eye(len(self.root)))
+        return np.asarray(inverse.T @ inverse)
 
     @property
     def strain(self) -> float:
@@ -126,13 +76,28 @@ class Fit:
 
 
 class Contest:
-    """Terms of one log, whitened, so that sets of them are fitted by small matrices."""
+    """Terms of one log, whitened, so that sets of them are fitted by small matrices.
+
+    Parameters
+    ----------
+    left_out
+        Words, and words at a site, that don't take part.
+    taking_part
+        ``[coarse]``: what is fitted to; all that moves when None.
+    terms
+        What takes part; every word at every site when None.
+    """
 
     def __init__(
-        self, torques: Torques, left_out: frozenset[str] = frozenset(), taking_part: Mask | None = None
+        self,
+        torques: Torques,
+        left_out: frozenset[str] = frozenset(),
+        *,
+        taking_part: Mask | None = None,
+        terms: Sequence[Term] | None = None,
     ) -> None:
         self.torques = torques
-        self.terms = all_terms(torques, left_out)
+        self.terms = list(all_terms(torques, left_out) if terms is None else terms)
         there = torques.moving if taking_part is None else torques.moving & taking_part
         self._whiten = np.sqrt(torques.numbers_a_sample) * there / torques.noise[:, None]
         inside, self._tolerated = tolerances(torques)
@@ -156,8 +121,11 @@ class Contest:
         self._words, self._every = Counter((term.word, term.rare) for term in kinds.values()), log(max(len(kinds), 1))
         # What tolerances alone leave.
         self._before = self._energy
+        self._fits: dict[tuple[tuple[int, ...], bytes | None], Fit] = {}
+        self._promises: dict[tuple[tuple[int, ...], bytes, bytes], Real] = {}
         self.nothing = self.fit(())
-        self._before = np.array([one.energy for one in self.nothing.left])
+        self._before = self.nothing.left.energy
+        self._fits.clear()
 
     def _row(self, row: int, numbers: Index, columns: Real) -> Row:
         return Row.of(numbers, columns, self._whiten[row], self.torques.missing[row])
@@ -167,7 +135,7 @@ class Contest:
         other = copy(self)
         for made in ("_alike", "_acting"):
             vars(other).pop(made, None)
-        vars(other).update(parts)
+        vars(other).update(parts, _fits={}, _promises={})
         return other
 
     def narrowed(self, terms: Sequence[Term]) -> "Contest":
@@ -205,27 +173,30 @@ class Contest:
         near
             A fit of nearly the same set, whose weights are begun with.
         """
+        key = tuple(map(id, terms)), None if near is None else near.weight.tobytes()
+        if key not in self._fits:
+            begin, rounds = (self._start, _ROUNDS) if near is None else (near.weight, _NEAR)
+            self._fits[key] = self._fit(terms, begin, rounds)
+        return self._fits[key]
+
+    def _fit(self, terms: Sequence[Term], weight: Real, rounds: int) -> Fit:
         chosen = self._chosen(terms)
         gram, right = self._moments(chosen)
         laws = self._laws(terms)
-        least, mean = self._least[chosen].copy(), self._mean[chosen]
-        weight = self._start if near is None else near.weight
+        least, mean = self._least[chosen], self._mean[chosen]
         arms = self._arms(terms)
-        for _ in range(_ROUNDS if near is None else _NEAR):
-            curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
-            numbers = _bounded(curvature, weight @ right + mean, least)
+        for _ in range(rounds):
+            numbers = _bounded(_information(weight, gram), weight @ right + mean, least)
             for first, last, share in arms:
                 least[first] = max(share * float(np.linalg.norm(numbers[first + 1 : last])), 0.0)
                 numbers[first] = max(numbers[first], least[first])
             left = self._left(gram, right, numbers, laws, self._passing(terms, numbers), self._units(terms, numbers))
-            weight = np.array([one.weight for one in left])
-        curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
-        covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
-        known = sum(one.log_likelihood for one in left)
-        size = -0.5 * float(np.sum((numbers - mean) ** 2)) - 0.5 * float(np.linalg.slogdet(curvature)[1])
+            weight = left.weight
+        root = _root(_information(weight, gram))
+        size = -0.5 * float(np.sum((numbers - mean) ** 2)) - float(np.sum(np.log(np.diag(root))))
         return Fit(
-            terms=tuple(terms), numbers=numbers, covariance=covariance, left=left, within=self.within,
-            nats=known + size + self.prior(terms), weight=weight,
+            terms=tuple(terms), numbers=numbers, root=root, left=left, within=self.within,
+            nats=float(np.sum(left.log_likelihood)) + size + self.prior(terms), weight=weight,
         )  # fmt: skip
 
     def _moments(self, chosen: Index) -> tuple[Real, Real]:
@@ -287,15 +258,15 @@ class Contest:
             place += count
         return found
 
-    def _laws(self, terms: Sequence[Term]) -> list[Index]:
-        """Places among the fitted numbers of what idealises: a joint's laws, and what its drive doesn't give."""
-        found: list[list[int]] = [[] for _ in self.torques.missing]
+    def _laws(self, terms: Sequence[Term]) -> Real:
+        """Give ``[row, number]``: one where a number idealises: of a joint's laws, of what its drive doesn't give."""
+        found = np.zeros((len(self._rows), self.within + sum(len(term.numbers) for term in terms)))
         place = self.within
         for term in terms:
-            for row in self.rows(term) if term.takes else term.rows:
-                found[row] += range(place, place + len(term.numbers))
+            rows = self.rows(term) if term.takes else term.rows
+            found[list(rows), place : place + len(term.numbers)] = 1.0
             place += len(term.numbers)
-        return [np.array(one, dtype=np.intp) for one in found]
+        return found
 
     def _passing(self, terms: Sequence[Term], numbers: Real) -> Real:
         """Give ``[row]``: share that the energy left is of what it'd be in units of the torque that was asked for.
@@ -330,42 +301,45 @@ class Contest:
             place += len(term.numbers)
         return found
 
-    def _left(
-        self, gram: Real, right: Real, numbers: Real, laws: Sequence[Index], passing: Real, units: Real
-    ) -> tuple[JointLeft, ...]:
+    def _left(self, gram: Real, right: Real, numbers: Real, laws: Real, passing: Real, units: Real) -> JointsLeft:
         energy = (self._energy - 2.0 * right @ numbers + (gram @ numbers) @ numbers) / passing
         energy += np.maximum(energy - self.count, 0.0) * (1.0 / units - 1.0)
-        found = []
-        for row, places in enumerate(laws):
-            own = numbers[places] @ gram[row][np.ix_(places, places)] @ numbers[places]
-            # Neither a law that is undone by tolerances nor one that adds nothing has details.
-            force = max(min(float(own), float(self._before[row] - energy[row])), 0.0) if places.size else None
-            found.append(JointLeft(energy=float(max(energy[row], 0.0)), count=float(self.count[row]), force=force))
-        return tuple(found)
+        own = laws * numbers
+        # Neither a law that is undone by tolerances nor one that adds nothing has details.
+        force = np.minimum(np.sum(own * (gram @ own[..., None])[..., 0], axis=1), self._before - energy)
+        return JointsLeft(energy=np.maximum(energy, 0.0), count=self.count, force=np.maximum(force, 0.0))
 
     def quietest(self, fit: Fit) -> Real:
         """Give ``[row]``: least energy over the noise that a fit leaves, or with the term more that promises most."""
-        found = [one.over_noise for one in fit.left]
+        found = fit.left.over_noise
         taken = {term.key for term in fit.terms}
         for row in range(len(found)):
             alone = np.zeros(len(found))
             alone[row] = 1.0
             _, term = next(one for one in self.promise(replace(fit, weight=alone)) if one[1].key not in taken)
             more = self.fit([*fit.terms, term], fit)
-            found = [min(least, one.over_noise) for least, one in zip(found, more.left, strict=True)]
-        return np.array(found)
+            found = np.minimum(found, more.left.over_noise)
+        return found
 
     def weighed_as(self, fit: Fit, weight: Real) -> Fit:
         """Give the numbers of the same set with its rows weighed so; what it leaves and its evidence stay."""
         chosen = self._chosen(fit.terms)
         gram, right = self._moments(chosen)
-        curvature = np.tensordot(weight, gram, 1) + np.eye(chosen.size)
-        numbers = _bounded(curvature, weight @ right + self._mean[chosen], self._least[chosen])
-        covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
-        return replace(fit, numbers=numbers, covariance=covariance, weight=weight)
+        information = _information(weight, gram)
+        numbers = _bounded(information, weight @ right + self._mean[chosen], self._least[chosen])
+        return replace(fit, numbers=numbers, root=_root(information), weight=weight)
 
     def promise(self, fit: Fit) -> list[tuple[float, Term]]:
-        """Give what each further term would bring at about, nats, with the rows weighed as in a fit."""
+        """Give what each further term would bring at about, nats, with the rows weighed as in a fit; most first."""
+        key = tuple(map(id, fit.terms)), fit.weight.tobytes(), fit.numbers.tobytes()
+        if key not in self._promises:
+            self._promises[key] = self._promised(fit)
+        gains = self._promises[key]
+        terms = [term for _, alike, _ in self._alike for term in alike]
+        return [(float(gains[place]), terms[place]) for place in np.argsort(-gains, kind="stable")]
+
+    def _promised(self, fit: Fit) -> Real:
+        """``[term]``: what each brings, in the order of `_alike`."""
         weight, chosen = fit.weight, self._chosen(fit.terms)
         gram, rest = np.zeros((self._size, chosen.size)), np.zeros(self._size)
         for row in np.flatnonzero(weight):
@@ -374,16 +348,16 @@ class Contest:
             gram[one.numbers[:, None], places] += weight[row] * one.gram[:, here]
             rest[one.numbers] += weight[row] * one.right
         rest -= gram @ fit.numbers
-        found: list[tuple[float, Term]] = []
-        for at, terms, blocks in self._alike:
+        shared = _solved(fit.root, gram.T).T
+        found = []
+        for at, _, blocks in self._alike:
             own = np.tensordot(weight, blocks, 1) + np.eye(at.shape[1])
-            own -= gram[at] @ fit.covariance @ np.swapaxes(gram[at], 1, 2)
+            own -= shared[at] @ np.swapaxes(shared[at], 1, 2)
             mean = self._mean[at]
             wanted = rest[at] + mean
             gains = np.einsum("tk,tk->t", wanted, np.linalg.solve(own, wanted[..., None])[..., 0])
-            gains -= np.linalg.slogdet(own)[1] + np.sum(mean**2, axis=1)
-            found += zip((0.5 * gains).tolist(), terms, strict=True)
-        return sorted(found, key=lambda one: one[0], reverse=True)
+            found.append(0.5 * (gains - np.linalg.slogdet(own)[1] - np.sum(mean**2, axis=1)))
+        return np.concatenate(found)
 
     @cached_property
     def _alike(self) -> list[tuple[Index, list[Term], Real]]:
@@ -450,8 +424,8 @@ class Contest:
 
     def unknowns(self, fit: Fit) -> Real:
         """Give ``[joint]``: nats that a torque of any shape there would bring beside a fit."""
-        alone = log(ANOTHER) - log(len(fit.left)) - DETAILS
-        return np.array([replace(one, force=np.inf).log_likelihood - one.log_likelihood + alone for one in fit.left])
+        alone = log(ANOTHER) - log(len(self._rows)) - DETAILS
+        return np.asarray(fit.left.of_any_shape().log_likelihood - fit.left.log_likelihood + alone)
 
 
 def _blocks(row: Row, at: Index) -> Real:
@@ -474,21 +448,37 @@ def _told(whitened: Real) -> Real:
     return np.asarray(combinations[:, information > _UNTOLD].T)
 
 
-def _bounded(curvature: Real, right: Real, least: Real) -> Real:
+def _information(weight: Real, gram: Real) -> Real:
+    """``[number, number]``: of numbers whose moments ``[row, number, number]`` are weighed."""
+    return np.tensordot(weight, gram, 1) + np.eye(gram.shape[1])
+
+
+def _root(information: Real) -> Real:
+    """Lower triangular."""
+    return np.asarray(np.linalg.cholesky(information), dtype=np.float64)
+
+
+def _bounded(information: Real, right: Real, least: Real) -> Real:
     """Solve for numbers of which some have a lower bound, by nonnegative least squares (Lawson & Hanson 1974)."""
-    numbers = np.linalg.solve(curvature, right)
-    if np.all(numbers >= least):
-        return np.asarray(numbers)
     bound = np.isfinite(least)
-    free = ~bound
-    # What the others make of the bounded ones is eliminated.
-    across = np.linalg.solve(
-        curvature[np.ix_(free, free)], np.column_stack([curvature[np.ix_(free, bound)], right[free]])
-    )
-    own = curvature[np.ix_(bound, bound)] - curvature[np.ix_(bound, free)] @ across[:, :-1]
-    wanted = right[bound] - curvature[np.ix_(bound, free)] @ across[:, -1] - own @ least[bound]
-    lower = np.linalg.cholesky(own)
-    above, _ = nnls(lower.T, np.linalg.solve(lower, wanted))
-    numbers[bound] = least[bound] + above
-    numbers[free] = across[:, -1] - across[:, :-1] @ numbers[bound]
-    return np.asarray(numbers)
+    # Behind the free ones, whose part is eliminated so.
+    order, free = np.argsort(bound, kind="stable"), int(np.sum(~bound))
+    root = _root(information[np.ix_(order, order)])
+    toward = _solved(root, right[order])
+    found = _solved(root, toward, turned=True)
+    low = least[order[free:]]
+    if np.any(found[free:] < low):
+        own = root[free:, free:].T
+        found[free:] = low + nnls(own, toward[free:] - own @ low)[0]
+        found[:free] = _solved(root[:free, :free], toward[:free] - found[free:] @ root[free:, :free], turned=True)
+    numbers = np.empty_like(found)
+    numbers[order] = found
+    return numbers
+
+
+def _solved(root: Real, right: Real, *, turned: bool = False) -> Real:
+    """Solve with a lower triangular matrix, or with its transpose.
+
+    By LAPACK itself: what checks its arguments takes longer than matrices of such sizes.
+    """
+    return np.asarray(dtrtrs(root.T, right, trans=0 if turned else 1)[0])

@@ -42,11 +42,13 @@ def _limited(torques: Torques, row: int) -> int:
 
 
 def _loops(torques: Torques) -> Iterator[Term]:
+    commands = torques.command() if torques.log.command_kind == "position" else None
     for row, joint in torques.told_rows:
         lag = Number(name="time_constant", unit="s", scale=_LAG_S, least=0.0)
         yield Term(word="lag", site=joint.name, make=partial(_lagging, torques, row), numbers=(lag,))
-        yield from _rate_limit(torques, row, joint)
-    if torques.log.command_kind == "position":
+        if commands is not None:
+            yield from _rate_limit(torques, row, joint, commands[row])
+    if commands is not None:
         yield from _gains(torques)
 
 
@@ -73,10 +75,9 @@ def _dead_zone(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
     yield from _limits(make, np.quantile(np.abs(asked), _WIDTHS), "width", units(joint)[0])
 
 
-def _rate_limit(torques: Torques, row: int, joint: RobotJoint) -> Iterator[Term]:
-    """A reference that follows commands no faster than so, as drives with a profile do."""
-    command = torques.command()[row] if torques.log.command_kind == "position" else None
-    if command is None or not np.all(np.isfinite(command)):
+def _rate_limit(torques: Torques, row: int, joint: RobotJoint, command: Real) -> Iterator[Term]:
+    """A reference that follows ``[sample]`` commands no faster than so, as drives with a profile do."""
+    if not np.all(np.isfinite(command)):
         return
     rates = np.abs(np.diff(command)) * torques.log.sample_rate_hz
     # Commands that are held step; what they go at is what smooth ones would.

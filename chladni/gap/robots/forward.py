@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from chladni.gap.calibration import SAME
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.joint_words import ALONG_THE_WAY, way_of
-from chladni.gap.robots.solved import Solved
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.tolerances import INERTIAL_NAMES, LOOP_S, tolerated_inertia
 from chladni.gap.robots.torques import ALL_COMMANDS, Torques
@@ -298,32 +298,66 @@ _LAWS: Mapping[str, Law] = {
 }
 
 
-def confirmed(solved: Solved) -> Confirmed | None:
-    """Run the description, and the machine that was found, from the log's poses by its commands.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trial:
+    """Runs of a log's machines from its poses, by its commands.
 
     Every other block of the log judges what was fitted to the rest. A run lasts a block where the drives hold
     positions, and a period of the cutoff where torques or speeds are asked, since then nothing brings a joint back.
-
-    Returns
-    -------
-    Confirmed | None
-        None where the drive of a joint isn't known: then it can't be run.
     """
-    torques = solved.torques
-    if not np.all(torques.driven):
-        return None
-    blocks, judge = _blocks(torques)
-    held_out = len(blocks) > 1
-    fit = solved.best
-    contest = solved.contest
-    if held_out:
-        coarse = judge[torques.kept]
-        contest = Contest(torques, taking_part=~coarse)
-        fit = contest.again(solved.best)
-    runs = _runs(torques, blocks)
-    machines = (as_described(torques.robot), machine_of(contest, contest.nothing), machine_of(contest, fit))
-    courses = [simulated(one, torques, runs) for one in machines]
-    return _told(torques, courses, judge if held_out else np.ones_like(judge), runs, held_out=held_out)
+
+    torques: Torques
+
+    def of(self, terms: Sequence[Term]) -> Confirmed | None:
+        """Run the description, and the machine that was found.
+
+        Returns
+        -------
+        Confirmed | None
+            None where the drive of a joint isn't known: then it can't be run.
+        """
+        if not np.all(self.torques.driven):
+            return None
+        courses = [self._described, self._tuned, self._run(terms)]
+        judge = self._judge if self._held_out else np.ones_like(self._judge)
+        return _told(self.torques, courses, judge, self._runs, held_out=self._held_out)
+
+    @cached_property
+    def _described(self) -> Real:
+        """``[joint, sample]``: as the description has it, whatever was found."""
+        memory = self.torques.memory
+        if "as described" not in memory:
+            memory["as described"] = simulated(as_described(self.torques.robot), self.torques, self._runs)
+        return np.asarray(memory["as described"])
+
+    @cached_property
+    def _tuned(self) -> Real:
+        return self._run(())
+
+    def _run(self, terms: Sequence[Term]) -> Real:
+        contest = Contest(self.torques, terms=terms, taking_part=self._learns)
+        return simulated(machine_of(contest, contest.fit(terms)), self.torques, self._runs)
+
+    @property
+    def _learns(self) -> Mask | None:
+        """``[coarse]``: what machines are fitted to; all of it when None."""
+        return ~self._judge[self.torques.kept] if self._held_out else None
+
+    @cached_property
+    def _parts(self) -> tuple[list[tuple[int, int]], Mask]:
+        return _blocks(self.torques)
+
+    @property
+    def _judge(self) -> Mask:
+        return self._parts[1]
+
+    @property
+    def _held_out(self) -> bool:
+        return len(self._parts[0]) > 1
+
+    @cached_property
+    def _runs(self) -> list[tuple[int, int]]:
+        return _runs(self.torques, self._parts[0])
 
 
 def _blocks(torques: Torques) -> tuple[list[tuple[int, int]], Mask]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
+from itertools import accumulate
 
 import numpy as np
 
@@ -143,14 +143,18 @@ def _dahl(position: Real, yields: float, stretches: tuple[tuple[int, int], ...])
     found = np.zeros_like(position)
     for first, last in stretches:
         steps = np.diff(position[first:last])
-        turns = np.flatnonzero(np.diff(np.sign(steps)) != 0) + 1
-        state = 0.0
-        for a, b in pairwise([0, *turns.tolist(), steps.size]):
-            sense = float(np.sign(steps[a]))
-            way = np.abs(position[first + a + 1 : first + b + 1] - position[first + a])
-            part = sense - (sense - state) * np.exp(-way / yields) if sense else np.full(b - a, state)
-            found[first + a + 1 : first + b + 1] = part
-            state = float(part[-1])
+        turns = np.concatenate([[0], np.flatnonzero(np.diff(np.sign(steps)) != 0) + 1])
+        counts = np.diff([*turns, steps.size])
+        sense, begin = np.sign(steps[turns]), np.repeat(position[first + turns], counts)
+        # What is left, of how far it was from its level where the joint turned.
+        left = np.exp(-np.abs(position[first + 1 : last] - begin) / yields)
+        states = accumulate(
+            zip(sense.tolist(), left[turns + counts - 1].tolist(), strict=True),
+            lambda state, way: way[0] - (way[0] - state) * way[1],
+            initial=0.0,
+        )
+        begun = np.fromiter(states, np.float64, turns.size + 1)[:-1]
+        found[first + 1 : last] = np.repeat(sense, counts) - np.repeat(sense - begun, counts) * left
     return found
 
 

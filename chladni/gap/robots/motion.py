@@ -1,10 +1,11 @@
 """The motion of a log's joints in one band, and what inverse dynamics makes of it."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,6 +56,13 @@ class Motion:
     log: JointLog
     cutoff_hz: float
     memory: dict[str, Any] = field(default_factory=dict)
+
+    def moving_as(self, other: "Motion") -> Self:
+        """Give the same with what was made of another's motion, which is the same."""
+        found, made = copy(self), vars(other)
+        own = [name for name, one in vars(Motion).items() if isinstance(one, cached_property)]
+        vars(found).update({name: made[name] for name in own if name in made})
+        return found
 
     @cached_property
     def joints(self) -> tuple[RobotJoint, ...]:

@@ -1,6 +1,5 @@
 """Which motion of a robot would tell apart what a log leaves open, as a sentence with the command that makes it."""
 
-import gc
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -229,8 +228,6 @@ def _alone(joint: RobotJoint) -> list[Motion]:
 
 def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
     """Nats by which the truth would be ahead, whichever it is; None when the motion can't be made."""
-    # Laws hold the torques that hold them: those of the motion before stay until they're collected.
-    gc.collect()
     torques = contest.torques
     robot = replace(torques.robot, model=loaded(torques.robot.model, motion.payload))
     one, other = doubt.terms
@@ -248,12 +245,13 @@ def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
         laid = _laid(torques, robot, _log_of(torques, made), forms)
         left_out = _left_out(contest, doubt)
         here = all_terms(laid, left_out)
-        ahead = [
-            _ahead(
-                Contest(_lacking(laid, _predicted(fit, here, laid), made), left_out), fit, own, rival, doubt.beside
-            )
-            for fit, own, rival in truths
-        ]
+        ahead = []
+        for fit, own, rival in truths:
+            lacking = _lacking(torques, laid, _predicted(fit, here, laid), made)
+            ahead.append(_ahead(Contest(lacking, left_out), fit, own, rival, doubt.beside))
+            # Laws hold the torques that hold them.
+            lacking.memory.clear()
+        laid.memory.clear()
     except (ChladniError, KeyError):
         return None
     return max(min(ahead), 0.0)
@@ -276,11 +274,12 @@ def _laid(torques: Torques, robot: Robot, log: JointLog, forms: Mapping[FormKey,
     )  # fmt: skip
 
 
-def _lacking(laid: Torques, missing: Real, made: Trajectory) -> Torques:
+def _lacking(torques: Torques, laid: Torques, missing: Real, made: Trajectory) -> Torques:
     """Give the torques of a machine that lacks ``[row, coarse]`` in the same motion: its drives give that more."""
     time_s = laid.log.time_s
     fast = np.array([np.interp(time_s, time_s[laid.kept], row) for row in missing])
-    return _laid(laid, laid.robot, _log_of(laid, made, fast), laid.guesses.forms).lacking(laid.missing + missing)
+    found = _laid(torques, laid.robot, _log_of(torques, made, fast), laid.guesses.forms)
+    return found.moving_as(laid).lacking(laid.missing + missing)
 
 
 def _predicted(fit: Fit, here: Sequence[Term], laid: Torques) -> Real:

@@ -1,8 +1,9 @@
 """The search for what a robot's description lacks: terms are added, exchanged and dropped while that pays."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import partial
+from itertools import islice, takewhile
 
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.term import FOUND, Term
@@ -42,7 +43,7 @@ def _more(contest: Contest, best: Fit) -> list[Fit]:
     """Fit the set with one more of the terms that promise most; or with a word at every joint."""
     taken = {term.key for term in best.terms}
     promised = _free(taken, contest.promise(best))
-    found = [contest.fit([*best.terms, term], best) for _, term in _each(promised)[:_FITTED]]
+    found = [contest.fit([*best.terms, term], best) for _, term in islice(_each(promised), _FITTED)]
     found += [contest.fit([*best.terms, *shared], best) for shared in _shared([term for _, term in promised])]
     if _best(found).nats > best.nats + _WORTH:
         return found
@@ -54,22 +55,23 @@ def _beside(contest: Contest, one: Fit) -> list[Fit]:
     """Fit a second term at the place of the last one."""
     last = one.terms[-1]
     taken = {other.key for other in one.terms}
-    near = [
+    near = (
         term for _, term in _each(contest.promise(one)) if term.key not in taken and set(term.rows) & set(last.rows)
-    ]
-    return [contest.fit([*one.terms, term], one) for term in near[:_EXCHANGED]]
+    )
+    return [contest.fit([*one.terms, term], one) for term in islice(near, _EXCHANGED)]
 
 
-def _each(promised: Iterable[Promise]) -> list[Promise]:
+def _each(promised: Iterable[Promise]) -> Iterator[Promise]:
     """Give of each law the form of its grid that promises most, and what it promises; and the one that was found.
 
     A promise knows no bounds, which the form that was found may keep better.
     """
-    found: dict[tuple[str, str, str | None, bool], Promise] = {}
+    seen = set[tuple[tuple[str, str], str | None, bool]]()
     for nats, term in promised:
-        is_found = term.form is not None and term.form.place == FOUND
-        found.setdefault((*term.key, term.variant, is_found), (nats, term))
-    return list(found.values())
+        kind = term.key, term.variant, term.form is not None and term.form.place == FOUND
+        if kind not in seen:
+            seen.add(kind)
+            yield nats, term
 
 
 def _shared(others: Sequence[Term]) -> Iterable[list[Term]]:
@@ -115,7 +117,7 @@ def _in_place(
     """
     found = {}
     for each in (rest, contest.weighed_as(rest, best.weight)):
-        near = _each(wanted(contest.promise(each)))[:count]
+        near = islice(_each(wanted(contest.promise(each))), count)
         found.update({id(term): term for _, term in near})
     return list(found.values())
 
@@ -174,9 +176,10 @@ def alternatives(contest: Contest, best: Fit, place: int, count: int, behind: fl
     taken, own = {one.key for one in rest}, best.terms[place]
     without = contest.fit(rest, best)
 
-    def near(promised: Sequence[Promise]) -> list[Promise]:
+    def near(promised: Sequence[Promise]) -> Iterator[Promise]:
         least = next(nats for nats, term in promised if term is own) - behind
-        return [(nats, term) for nats, term in _free(taken, promised) if term is not own and nats > least]
+        likely = takewhile(lambda one: one[0] > least, promised)
+        return (one for one in likely if one[1] is not own and one[1].key not in taken)
 
     others = [contest.fit([*rest, term], best) for term in _in_place(contest, without, best, count, near)]
     # Two forms of a law are one rival.

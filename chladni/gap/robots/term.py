@@ -140,7 +140,7 @@ class Term:
         """
         return self.make()
 
-    @property
+    @cached_property
     def key(self) -> tuple[str, str]:
         """Word and site."""
         return self.word, self.site
@@ -150,7 +150,7 @@ class Term:
         """Whether it acts between two joints."""
         return self.ratio is not None
 
-    @property
+    @cached_property
     def kind(self) -> tuple[str, str | None, int]:
         """What terms of several joints have in common."""
         return self.word, self.variant, 0 if self.form is None else self.form.place

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chladni.gap.robots.contest import Contest
-from chladni.gap.robots.forward import Confirmed, confirmed, machine_of, simulated
+from chladni.gap.robots.forward import Confirmed, Trial, machine_of, simulated
 from chladni.gap.robots.solved import Solved, solved
 from chladni.gap.robots.torques import Torques, torques_of
 from chladni.robots.machine import Coupling, as_described
@@ -51,6 +51,11 @@ def test_a_description_that_is_right_reproduces_its_log(tmp_path: Path) -> None:
     np.testing.assert_allclose(found[:, 500:1500], one.log.position[:, 500:1500], atol=1e-3)
 
 
+def trial(found: Solved) -> Confirmed | None:
+    """What simulation says of all that was found."""
+    return Trial(torques=found.torques).of(found.best.terms)
+
+
 @pytest.fixture(scope="module")
 def friction_and_mass(tmp_path_factory: pytest.TempPathFactory) -> Solved:
     """A shoulder that rubs, and a forearm that is too heavy."""
@@ -59,7 +64,7 @@ def friction_and_mass(tmp_path_factory: pytest.TempPathFactory) -> Solved:
 
 
 def test_what_was_found_closes_the_gap_on_stretches_that_no_fit_saw(friction_and_mass: Solved) -> None:
-    found = confirmed(friction_and_mass)
+    found = trial(friction_and_mass)
     assert found is not None
     assert found.held_out
     assert found.joints == ("shoulder", "elbow")
@@ -99,7 +104,7 @@ def test_a_delay_of_all_commands_and_weak_gains(tmp_path: Path) -> None:
     kp, kd, _ = machine.joints[0].gains()
     assert kp == pytest.approx(96.0, rel=0.03)
     assert kd == pytest.approx(8.0, rel=0.1)
-    closing = confirmed(found)
+    closing = trial(found)
     assert closing is not None
     assert closing.after < 0.1 * closing.before
 
@@ -122,7 +127,7 @@ def test_a_log_of_efforts_runs_in_short_windows(tmp_path: Path) -> None:
     effort = np.array([[120.0], [60.0]]) * (command - position) - np.array([[8.0], [3.0]]) * velocity
     described = arm(tmp_path)
     one = torques_of(described, joint_log_of(described, position, effort=effort))
-    found = confirmed(found_by(one))
+    found = trial(found_by(one))
     assert found is not None
     assert found.horizon_s == pytest.approx(1.0 / one.cutoff_hz, abs=1.0 / RATE_HZ)
     assert found.after < 0.3 * found.before
@@ -134,15 +139,14 @@ def test_nothing_is_run_where_the_drive_of_a_joint_is_not_known(tmp_path: Path) 
     log = joint_log_of(robot, run_native(robot, command), command=command)
     unknown = replace(robot.joints[1], servo=None)
     one = torques_of(replace(robot, joints=(robot.joints[0], unknown)), log)
-    contest = Contest(one)
-    assert confirmed(Solved(contest=contest, best=contest.nothing)) is None
+    assert Trial(torques=one).of(()) is None
 
 
 def test_a_short_log_judges_by_all_of_it_and_says_so(tmp_path: Path) -> None:
     command = commands(3.0)
     robot = arm(tmp_path)
-    contest = Contest(torques_of(robot, joint_log_of(robot, run_native(robot, command), command=command)))
-    found = confirmed(Solved(contest=contest, best=contest.nothing))
+    log = joint_log_of(robot, run_native(robot, command), command=command)
+    found = Trial(torques=torques_of(robot, log)).of(())
     assert found is not None
     assert not found.held_out
     assert found.judged.all()
