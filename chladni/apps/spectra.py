@@ -274,6 +274,7 @@ def transfer(
     names = None if responses is None else tuple(dict.fromkeys((*references, *responses)))
     if isinstance(source, TimeSeries):
         references = source.names(references)
+        _require_others(references, None if responses is None else source.names(responses))
         spectra = averaging.spectra(_of_series(source, names, span), references)
         return frequency_response(
             spectra,
@@ -286,6 +287,7 @@ def transfer(
     references = source.names(references)
     grid = _grid_of(source, references, names, span, progress)
     named = None if responses is None else source.names(responses)
+    _require_others(references, named)
     try:
         spectra = averaging.spectra(grid, references)
         spectra = replace(spectra, provenance=spectra.provenance.with_notes(*grid.notes))
@@ -297,6 +299,14 @@ def transfer(
         )
     except EstimateError as error:
         raise EstimateError(f"{source.path.name}: {error}") from error
+
+
+def _require_others(references: Sequence[str], responses: Sequence[str] | None) -> None:
+    both = [one for one in responses or () if one in references]
+    if both:
+        raise EstimateError(
+            f"{some_of(both)}: reference and response at once, which gives 1 everywhere; name another response"
+        )
 
 
 def log_deflection(
@@ -448,7 +458,7 @@ def without_constant(spectra: SpectraT, watched: Watched, *, keep: Sequence[str]
         return spectra
     moving = [channel.name for channel in spectra.channels if channel.name not in constant]
     if not moving:
-        raise EstimateError(f"no channel changes: {some_of(list(constant))}; nothing to make a spectrum of")
+        raise EstimateError("no channel changes, so there is nothing to make a spectrum of")
     note = f"channels that never change are left out: {some_of(list(constant))}"
     chosen = spectra.select(moving)
     return replace(chosen, provenance=chosen.provenance.with_notes(note))

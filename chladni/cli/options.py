@@ -261,10 +261,21 @@ def _band(option: str, left: deque[str]) -> list[str]:
     """Take the ends of a band off the words that are left."""
     word = left.popleft() if left else ""
     if together := _BAND.fullmatch(word):
-        return list(together.groups())
+        return _rising(option, list(together.groups()))
     apart = [word, *islice(left, 1)]
+    numbers: list[float] = []
     with suppress(ValueError):
-        if len([*map(real_number, apart)]) == 2:
-            left.popleft()
-            return apart
+        numbers = [*map(real_number, apart)]
+    if len(numbers) == 2:
+        left.popleft()
+        return _rising(option, apart)
     raise typer.BadParameter(f"{option} {word!r} is no band; give its ends in Hz, such as {option} 5-50")
+
+
+def _rising(option: str, ends: list[str]) -> list[str]:
+    low, high = ends
+    if real_number(low) >= real_number(high):
+        raise typer.BadParameter(
+            f"{option} {low}-{high} doesn't rise; give the lower end first, such as {option} 5-50"
+        )
+    return ends

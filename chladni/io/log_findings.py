@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from chladni.io.catalog import Catalog
 from chladni.io.channel_source import UNKNOWN_UNIT
-from chladni.io.clock.time_base import TimeBase
+from chladni.io.clock.clock_verdict import breaks_sentence
 from chladni.io.log_info import some_of, unread_sentences
 from chladni.io.loss import Loss
 from chladni.io.placement import Placement
@@ -104,28 +104,13 @@ def _clock_findings(placement: Placement) -> Iterator[tuple[str, str]]:
     if base.verdict != "regular" or base.gap_count or base.wander_s * base.rate_hz > 1:
         yield label, base.advice
     if len(base.breaks_s):
-        yield label, _breaks(base)
+        yield label, breaks_sentence(base)
     if base.duplicates:
         yield label, f"{counted(base.duplicates, 'message')} with the stamp of another"
     if placement.left_out:
         yield label, f"{counted(placement.left_out, 'sample')} left out: an earlier one has the place on the grid"
     if base.out_of_order:
         yield label, f"{counted(base.out_of_order, 'message')} came after later ones, and were put in order"
-
-
-def _breaks(base: TimeBase) -> str:
-    """Say how often and by how much the clock was set, and what that leaves."""
-    told = []
-    if base.clock.count:
-        sizes_s = base.clock.sizes_s
-        some = ", ".join(f"{size:.3g} s" for size in sizes_s[:3]) + (", ..." if sizes_s.size > 3 else "")
-        told.append(f"the clock was set {counted(base.clock.count, 'time')} ({some}); time runs on from each")
-    leaps = len(base.breaks_s) - base.clock.count
-    if leaps:
-        told.append(f"it leaps ahead {counted(leaps, 'time')} by more than was recorded: it was set, or paused")
-    if base.longest_stretch_s:
-        told.append(f"no average crosses a break, and the longest stretch is {base.longest_stretch_s:.4g} s")
-    return "; ".join(told)
 
 
 # --- of channels -------------------------------------------------------------------------------------------------

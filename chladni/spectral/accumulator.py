@@ -351,7 +351,10 @@ class SpectraAccumulator(Generic[SpectraT]):
         skipped = self.stretch.skipped
         if not skipped:
             return ()
-        return (f"{skipped} of {averages + skipped} segments are left out: samples are missing in them",)
+        of = f"{skipped} of {averages + skipped} segments"
+        if skipped == 1:
+            return (f"{of} is left out: samples are missing in it",)
+        return (f"{of} are left out: samples are missing in them",)
 
     def _nothing_averaged(self) -> str:
         samples, longest = self.segmentation.samples, self.stretch.longest_run

@@ -268,3 +268,11 @@ def test_values_too_large_to_square_are_an_error_that_names_their_channel(tmp_pa
     rows = {"broken": 1e200 * np.random.default_rng(5).standard_normal(4000)}
     with log_of(tmp_path, rows) as log, pytest.raises(EstimateError, match=r"/broken.* holds values up to"):
         densities(log)
+
+
+def test_a_reference_is_no_response_of_its_own(tmp_path):
+    rows = {"a": np.random.default_rng(2).standard_normal(4096), "b": np.random.default_rng(3).standard_normal(4096)}
+    with log_of(tmp_path, rows) as log:
+        for source in (log, log.read()):
+            with pytest.raises(EstimateError, match="reference and response at once"):
+                chladni.frf(source, references="/a.accel.linear.x", responses=["/a.accel.linear.x"])

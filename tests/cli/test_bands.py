@@ -65,3 +65,10 @@ def test_a_band_ends_with_itself_and_options_end_with_two_dashes(run: Run) -> No
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert "unexpected extra argument" in outcome.err
     assert "--band: can't be opened" in run("levels", "--", "--band").err
+
+
+@pytest.mark.parametrize("words", [["50-5"], ["50", "5"], ["5-5"]])
+def test_a_band_that_falls_is_told(run: Run, arm_log: object, words: list[str]) -> None:
+    outcome = run("levels", arm_log, "--band", *words)
+    assert outcome.code == 2
+    assert "doesn't rise; give the lower end first" in outcome.err

@@ -70,6 +70,21 @@ def advice(base: "TimeBase", unless_hz: float = 0.0) -> str:
     return "; ".join(_remarks(base)) or SOUND
 
 
+def breaks_sentence(base: "TimeBase") -> str:
+    """Say how often and by how much the clock was set, and what that leaves."""
+    told = []
+    if base.clock.count:
+        sizes_s = base.clock.sizes_s
+        some = ", ".join(f"{size:.3g} s" for size in sizes_s[:3]) + (", ..." if sizes_s.size > 3 else "")
+        told.append(f"the clock was set {counted(base.clock.count, 'time')} ({some}); time runs on from each")
+    leaps = len(base.breaks_s) - base.clock.count
+    if leaps:
+        told.append(f"it leaps ahead {counted(leaps, 'time')} by more than was recorded: it was set, or paused")
+    if base.longest_stretch_s:
+        told.append(f"no average crosses a break, and the longest stretch is {base.longest_stretch_s:.4g} s")
+    return "; ".join(told)
+
+
 def uneven(steps_ns: Whole) -> str:
     """Give the advice for stamps that are near a clock, but keep no rate that all of them would fit."""
     low_ms, high_ms = np.percentile(steps_ns, [5, 95]) * 1e-6

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.repeats import digests_of, repeats_of
 from chladni.signals.arrays import Mask, Real, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, LogError, SetupError
@@ -146,13 +147,15 @@ def placed_rows(
     LogError
         When the times have no rate, or are too few to tell one.
     """
-    from chladni.io.clock.time_base import fit_time_base
+    from chladni.io.clock.clock_verdict import breaks_sentence
     from chladni.io.clock.uniform import place
 
     # A record with a pretrigger begins before 0, which no clock does: the fit is about differences only.
     origin_ns = int(stamps_ns.min(initial=2**62))
     try:
-        base = fit_time_base(stamps_ns - origin_ns)
+        kept, base = _fitted(stamps_ns - origin_ns, np.stack(rows))
+        again = stamps_ns.size - kept.size
+        stamps_ns, rows = stamps_ns[kept], [row[kept] for row in rows] if again else rows
         grid = place(
             stamps_ns - origin_ns, np.stack(rows), base, channels=tuple(channels), max_samples=_most_values(rows)
         )
@@ -165,15 +168,37 @@ def placed_rows(
         start_time_ns=grid.start_time_ns + origin_ns,
     )
     notes = [] if base.verdict == "regular" else [f"{where}: the times are {base.verdict}: {base.advice}."]
+    if len(base.breaks_s):
+        notes.append(f"{where}: {breaks_sentence(base)}.")
     there = np.isfinite(rows).any(axis=0)
     lost = int(np.delete(there, base.strays).sum() - np.isfinite(grid.values).any(axis=0).sum())
     if base.strays.size:
         notes.append(
             f"{where}: {counted(base.strays.size, 'row')} left out, whose time contradicts the count of rows around."
         )
+    if again:
+        notes.append(f"{where}: {counted(again, 'row')} left out: another one has the same time and the same values.")
     if lost:
         notes.append(f"{where}: {counted(lost, 'sample')} left out: another one came at the same time.")
+    base = replace(base, samples=base.samples + again, duplicates=base.duplicates + again)
     return FileContents(series=(series,), notes=tuple(notes), time_bases=(base,))
+
+
+def _fitted(stamps_ns: Whole, values: NDArray[np.floating]) -> tuple[Whole, "TimeBase"]:
+    """Fit a clock to the rows that aren't written twice; give these rows as well."""
+    from chladni.io.clock.time_base import fit_time_base
+
+    everything = np.arange(stamps_ns.size)
+    repeats = repeats_of(stamps_ns, digests_of(values if values.dtype.kind == "f" else values.astype(np.float64)))
+    if repeats is None:
+        return everything, fit_time_base(stamps_ns)
+    if repeats.differ:
+        # Rows of one time that differ are samples; then those that don't may be, too.
+        base = fit_time_base(stamps_ns)
+        if base.uniform and not base.duplicates:
+            return everything, base
+    kept = np.flatnonzero(repeats.twin == everything)
+    return kept, fit_time_base(stamps_ns[kept])
 
 
 def on_common_grids(series: Sequence[TimeSeries]) -> tuple[TimeSeries, ...]:

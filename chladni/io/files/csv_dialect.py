@@ -116,7 +116,10 @@ def sniff_csv(path: Path, *, decimal: str | None = None) -> CsvDialect:
         if runs:
             break
     else:
-        raise LogError(f"{path}: no line of numbers within the first {len(lines)} lines; is it a CSV file?")
+        if not any(line.strip() for line in lines):
+            raise LogError(f"{path}: the file is empty; expected lines of numbers")
+        where = "its only line" if len(lines) == 1 else f"its first {len(lines)} lines"
+        raise LogError(f"{path}: no line of numbers in {where}; is it a CSV file?")
     longest = max(len(run.lines) for run in runs)
     # Rows of numbers alone are surer than rows with text, and "1,5" is two cells before it's one.
     rows = max(

@@ -135,6 +135,8 @@ def _flat(content: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[tuple[str, 
             unread.append((name, value.reason))
         elif isinstance(value, Mapping) and depth < _MAX_DEPTH:
             waiting.extend((f"{name}.{field}", part, depth + 1) for field, part in reversed(list(value.items())))
+        elif isinstance(value, list) and value and all(isinstance(part, str) for part in value):
+            flat[name] = np.array(value)
         elif isinstance(value, list) and depth < _MAX_DEPTH:
             # Cells of text are names and remarks.
             parts = [(place, part) for place, part in enumerate(value) if not isinstance(part, str)]

@@ -1,19 +1,20 @@
 """Time series from a set of named arrays, as ``.mat``, ``.npz`` and ``.npy`` files hold them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chladni.io.files.columns import Column
+from chladni.io.files.columns import Column, is_unit
 from chladni.io.files.contents import FileContents
 from chladni.io.files.table import Part, series_of_parts
 from chladni.io.files.time_column import is_time_name
 from chladni.io.files.time_reading import NO_TIMES, NS_OF, UNIT_OF, TimeOptions, words_of
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import NS_PER_S, is_sample_rate
+from chladni.signals.wording import shown
 
 _RATE_NAMES: Final = frozenset(
     {"fs", "sr", "fsamp", "fsample", "sfreq", "framerate"}
@@ -23,6 +24,8 @@ _INTERVAL_NAMES: Final = frozenset(
     {"dt", "ts", "deltat", "tsample"}
     | {f"{how}{what}" for how in ("sample", "sampling") for what in ("time", "interval", "period")}
 )
+# A field of this name says in what the array beside it counts.
+_UNIT_NAMES: Final = frozenset({"unit", "units"})
 # The longer ones first: each ends in hz.
 _HZ: Final = {"khz": 1e3, "mhz": 1e6, "hz": 1.0}
 # Two scalars say the same rate when they're this near: an interval is often rounded.
@@ -42,7 +45,8 @@ def series_of_arrays(
     The rate is a scalar called ``fs``, ``sample_rate`` or alike (Hz), or an interval called ``dt`` or alike (s).
     Times are a vector called ``t``, ``time`` or alike. Vectors as long as it, or else as the longest one, are
     channels; of a matrix each column or row of that length is one, ``name[0]``, ``name[1]``, ... Arrays of one struct
-    (``run.time``, ``run.x``) belong together: each struct with times or a rate of its own is a series of its own.
+    (``run.time``, ``run.x``) belong together: each struct with times or a rate of its own is a series of its own. A
+    text called ``unit`` or ``units`` beside one array alone is its unit, and several texts those of its channels.
 
     Parameters
     ----------
@@ -87,7 +91,9 @@ def _parts(
         beside = [signals[other] for other, key in keys.items() if key == (struct, 0)]
         longest = length or max(max(one.shape) for one in beside)
         if longest in array.shape:
-            groups.setdefault((struct, longest), []).extend(_columns(name, array, longest))
+            units, unread = _units(name, signals, arrays)
+            left_out += unread
+            groups.setdefault((struct, longest), []).extend(_columns(name, array, longest, units))
         else:
             left_out.append((name, f"of {array.size} numbers beside {longest} samples"))
     parts = []
@@ -96,6 +102,31 @@ def _parts(
         stated_hz, stated_by = (None, "") if rate is None else (rate.hz, repr(rate.name))
         parts.append(Part(columns=columns, stated_rate_hz=stated_hz, stated_by=stated_by))
     return parts, left_out
+
+
+def _units(
+    name: str, signals: Mapping[str, NDArray[Any]], arrays: Mapping[str, Any]
+) -> tuple[tuple[str, ...], list[tuple[str, str]]]:
+    """Give the units that stand beside an array, one for all or one for each channel; and what there is no unit."""
+    struct = name.rpartition(".")[0]
+    beside = [one for one in signals if one.rpartition(".")[0] == struct and not is_time_name(one)]
+    if beside != [name]:
+        # A text beside several arrays doesn't say whose it is.
+        return (), []
+    for key, content in arrays.items():
+        if key.rpartition(".")[0] == struct and key.rpartition(".")[2].lower() in _UNIT_NAMES:
+            texts = _texts(content)
+            strange = [text for text in texts if not is_unit(text)]
+            if strange:
+                return (), [(key, f"{shown(strange[0])} is no unit that is known")]
+            return texts, []
+    return (), []
+
+
+def _texts(content: Any) -> tuple[str, ...]:
+    """Give one text, or several; none of anything else."""
+    array = np.asarray(content)
+    return tuple(str(one).strip() for one in array.ravel()) if array.dtype.kind == "U" and array.size else ()
 
 
 def _stated(rates: list[_Rate], options: TimeOptions, where: str) -> _Rate | None:
@@ -183,11 +214,17 @@ def _is_signal(array: Any) -> bool:
     return isinstance(array, np.ndarray) and array.ndim in (1, 2) and array.size > 1 and array.dtype.kind in "fiubmM"
 
 
-def _columns(name: str, array: NDArray[Any], length: int) -> list[Column]:
-    """Give a column for each vector of the length; of a square matrix its columns, as MATLAB likes them."""
+def _columns(name: str, array: NDArray[Any], length: int, units: Sequence[str]) -> list[Column]:
+    """Give a column for each vector of the length; of a square matrix its columns, as MATLAB likes them.
+
+    A single unit is that of all; as many as there are columns are theirs in turn.
+    """
     rows = array.reshape(1, -1) if array.size == length else array.T if array.shape[0] == length else array
     labels = [name] if len(rows) == 1 else [f"{name}[{index}]" for index in range(len(rows))]
-    return [Column(name=label, numbers=row) for label, row in zip(labels, rows, strict=True)]
+    known: Sequence[str | None] = (
+        units if len(units) == len(rows) else [units[0] if len(units) == 1 else None] * len(rows)
+    )
+    return [Column(name=label, numbers=row, unit=unit) for label, row, unit in zip(labels, rows, known, strict=True)]
 
 
 def _listed(arrays: Mapping[str, Any]) -> str:

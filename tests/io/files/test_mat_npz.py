@@ -356,3 +356,31 @@ def test_wrong_bytes_never_crash(tmp_path: Path, kind: str) -> None:
         except ChladniError:
             refused += 1
     assert refused > 25
+
+
+def test_a_unit_beside_an_array_is_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "units.mat"
+    rows = np.arange(20.0).reshape(10, 2)
+    units = np.array(["g", "N"], dtype=object)
+    tip, both = {"data": rows[:, 0], "fs": 50.0, "unit": "g"}, {"x": rows, "fs": 50.0, "units": units}
+    savemat(path, {"tip": tip, "both": both})
+    found = {
+        channel.name: (channel.unit, values)
+        for series in read_mat(path).series
+        for channel, values in zip(series.channels, series.values, strict=True)
+    }
+    assert {name: unit for name, (unit, _) in found.items()} == {
+        "tip.data": "m/s^2", "both.x[0]": "m/s^2", "both.x[1]": "N"
+    }  # fmt: skip
+    np.testing.assert_allclose(found["tip.data"][1], 9.80665 * rows[:, 0])
+    np.testing.assert_array_equal(found["both.x[1]"][1], rows[:, 1])
+
+
+def test_a_unit_that_is_none_or_nobodys_changes_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "strange.mat"
+    row = np.arange(10.0)
+    two = {"a": row, "b": row, "fs": 50.0, "unit": "g"}
+    savemat(path, {"run": {"data": row, "fs": 50.0, "unit": "volts-ish"}, "two": two})
+    contents = read_mat(path)
+    assert {channel.unit for series in contents.series for channel in series.channels} == {"1"}
+    assert contents.unread == (("run.unit", "'volts-ish' is no unit that is known"),)

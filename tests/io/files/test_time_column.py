@@ -360,3 +360,29 @@ def test_rows_that_last_longer_than_nanoseconds_count_are_refused_by_name(tmp_pa
     with pytest.raises(ChladniError, match=r"a\.npz: .*farther from 1970 than nanoseconds") as caught:
         read_file(path)
     assert "check the rate" in str(caught.value)
+
+
+@pytest.mark.parametrize("every", [1, 2, 250])
+def test_rows_that_are_written_twice_are_read_once(tmp_path: Path, every: int) -> None:
+    # Evenly doubled, shared times look like those of a clock that ticks more slowly than the rows come.
+    values = np.random.default_rng(3).standard_normal(2000)
+    lines = [f"{place / 1000:.3f},{value:.17g}\n" for place, value in enumerate(values)]
+    twice = [line for place, line in enumerate(lines) for line in [line] * (2 if place % every == 0 else 1)]
+    path = tmp_path / "twice.csv"
+    path.write_text("t [s],a\n" + "".join(twice))
+    contents = read_file(path)
+    [series] = contents.series
+    assert series.sample_rate_hz == 1000.0
+    np.testing.assert_array_equal(series.values[0], values)
+    assert f"{2000 // every} rows left out: another one has the same time and the same values." in contents.notes[-1]
+    [base] = contents.time_bases
+    assert base is not None
+    assert base.duplicates == 2000 // every
+
+
+def test_a_clock_that_was_set_back_is_told(tmp_path: Path) -> None:
+    times = np.arange(4000) / 1000
+    times[2000:] -= 1.0
+    path = tmp_path / "back.csv"
+    path.write_text("t [s],a\n" + "".join(f"{time:.3f},{place % 7}\n" for place, time in enumerate(times)))
+    assert "the clock was set 1 time (-0.999 s)" in " ".join(read_file(path).notes)
