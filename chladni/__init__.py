@@ -94,7 +94,7 @@ _HOME = {
     "Simulation": "chladni.models.core.simulation",
     "DRIVES": "chladni.models.drives.catalogue",
     "drive_model": "chladni.models.drives.drive_model",
-    "mr_damper_at": "chladni.models.drives.mr_damper",
+    "mr_damper_at": "chladni.models.drives.magnetorheological_damper",
     "fit_mr_damper": "chladni.models.drives.mr_damper_fit",
     "mr_record": "chladni.models.drives.mr_record",
     "attached": "chladni.models.effects.attached_effect",
@@ -301,7 +301,7 @@ if TYPE_CHECKING:
     from chladni.models.core.simulation import Simulation as Simulation
     from chladni.models.drives.catalogue import DRIVES as DRIVES
     from chladni.models.drives.drive_model import drive_model as drive_model
-    from chladni.models.drives.mr_damper import mr_damper_at as mr_damper_at
+    from chladni.models.drives.magnetorheological_damper import mr_damper_at as mr_damper_at
     from chladni.models.drives.mr_damper_fit import fit_mr_damper as fit_mr_damper
     from chladni.models.drives.mr_record import mr_record as mr_record
     from chladni.models.effects.attached_effect import attached as attached

@@ -276,6 +276,6 @@ def _rising(option: str, ends: list[str]) -> list[str]:
     low, high = ends
     if real_number(low) >= real_number(high):
         raise typer.BadParameter(
-            f"{option} {low}-{high} doesn't rise; give the lower end first, such as {option} 5-50"
+            f"{option}: a band from {low} to {high} Hz doesn't rise; give the lower end first, then a higher one"
         )
     return ends

@@ -8,7 +8,8 @@ import typer
 from chladni.cli import options
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
-from chladni.cli.words import number
+from chladni.cli.words import NOTHING, number
+from chladni.signals.unit_text import with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,7 +84,7 @@ def _print_checks(out: Output, found: "Sequence[Tolerated]", unit: str) -> None:
     factor, _ = si_factor(unit)
     profile = found[0].check.profile
     out.channel_table(
-        f"Profile of {number(profile.rms() / factor)} {unit} RMS, +{number(profile.upper_db)} -"
+        f"Profile of {with_unit(number(profile.rms() / factor), unit)} RMS, +{number(profile.upper_db)} -"
         f"{number(profile.lower_db)} dB",
         ["channel", "RMS", "unit", "lines outside [%]", "highest [dB]", "at [Hz]", "lowest [dB]", "at [Hz]",
          "one sigma [dB]"],
@@ -98,7 +99,7 @@ def _row(one: "Tolerated", row: int, factor: float, unit: str) -> list[str]:
     return [
         check.channels[row].name,
         number(float(check.rms[row]) / factor),
-        unit,
+        NOTHING if unit == "1" else unit,
         number(PERCENT * float(check.outside[row]), digits=3),
         f"{deviation[high]:+.1f}",
         number(float(check.frequency_hz[high])),

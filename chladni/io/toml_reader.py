@@ -119,6 +119,10 @@ class TomlDocument:
         try:
             self.content: dict[str, Any] = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
+            if text.lstrip("\ufeff \t\r\n").startswith("<"):
+                raise kind(
+                    f"{name}: is XML, and TOML is read here; a robot begins with <mujoco> or <robot>"
+                ) from None
             raise kind(_syntax_message(str(error), name, self._text.split("\n"))) from None
         except RecursionError:
             raise kind(f"{name}:1: tables or lists are {_TOO_DEEP}") from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections import Counter
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Final
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from chladni.robots.description import Description, is_mesh, missing_meshes, parsed, real, text_of
 from chladni.signals.errors import ModelError
+from chladni.signals.wording import shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,6 +37,7 @@ def read_urdf(path: Path, *, meshes: bool, base: BaseKind | None) -> Description
     root = parsed(path)
     if any(one.tag.startswith("xacro:") for one in root.iter()):
         raise ModelError(f"{path}: holds xacro macros; expand them: xacro {path.name} -o robot.urdf")
+    _require_names_once(path, root)
     for child in [one for one in root if one.tag not in _OWN]:
         # Of Gazebo, of controllers, of MoveIt.
         root.remove(child)
@@ -50,6 +53,15 @@ def read_urdf(path: Path, *, meshes: bool, base: BaseKind | None) -> Description
         remarks=tuple(remarks),
         shapeless=missing_meshes(missing),
     )
+
+
+def _require_names_once(path: Path, root: ET.Element) -> None:
+    """Refuse names that stand twice: MuJoCo would take the name of the second away without a word."""
+    for tag in ("link", "joint"):
+        often = Counter(one.get("name", "") for one in root.findall(tag))
+        twice = [shown(name) for name, count in often.items() if count > 1]
+        if twice:
+            raise ModelError(f"{path}: two {tag}s are called {', '.join(twice)}; give each a name of its own")
 
 
 def _set_compiler(root: ET.Element) -> None:

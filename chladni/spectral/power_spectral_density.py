@@ -1,4 +1,4 @@
-"""Power spectral densities from averaged cross-spectra."""
+"""Power spectral densities after Welch: periodograms of windowed segments that overlap, averaged."""
 
 from typing import Any
 

@@ -73,7 +73,7 @@ def test_a_delay_is_found_with_its_sign(run, walk, tmp_path):
     [
         ("ods", ("--reference", "/bse.x"), "/bse.x"),
         ("ods", ("--reference", BASE, "--frequency", 300), "walk.mcap: 300 Hz lies outside the spectrum"),
-        ("delay", ("--reference", BASE, "--band", 300, 100), "walk.mcap: a band from 300 to 100 Hz"),
+        ("delay", ("--reference", BASE, "--band", 300, 100), "--band: a band from 300 to 100 Hz"),
         ("delay", ("--reference", FORCE), "walk.mcap: nothing that changes is in N as /cell.f is"),
         ("delay", ("--reference", BASE, "--response", FORCE), "isn't coherent with /base.x"),
     ],

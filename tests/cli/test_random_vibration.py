@@ -62,7 +62,7 @@ def test_a_tone_is_read_between_lines(run, shaken, tmp_path):
         (("tolerance", "10:0.01"), "two breakpoints or more"),
         (("tolerance", *PROFILE, "--unit", "N"), "no channel is in N, as the profile is; units are m/s^2"),
         (("tolerance", *PROFILE, "--upper", -1), "both must be 0 or more"),
-        (("zoom", "--band", 300, 100), "shaken.mcap: a band from 300 to 100 Hz"),
+        (("zoom", "--band", 300, 100), "--band: a band from 300 to 100 Hz"),
         (("zoom", "--band", 100, 300, "--lines", 1), "1 line; give 2 to"),
         (("zoom", "--band", 100, 300, "--window", "hand"), "hand"),
     ],

@@ -48,7 +48,7 @@ def test_people_get_a_table_and_a_picture(run, drop, tmp_path):
     [
         (("--channel", "cell"), "cell is in N; a shock response spectrum is of accelerations"),
         (("--q", "0.2"), "drop.csv: q is 0.2"),
-        (("--band", "100", "20"), "give LOW < HIGH"),
+        (("--band", "100", "20"), "give the lower end first"),
         (("--band", "100", "2e4"), "half the sample rate, 2500 Hz"),
         (("--lines", "0"), "lines an octave"),
         (("--start", "7"), "no sample"),

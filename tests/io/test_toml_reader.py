@@ -258,6 +258,7 @@ def read(tmp_path: Path, content: str | bytes) -> str:
     ("content", "told"),
     [
         ("a = \n", "m.toml:1: not TOML: "),
+        ("<html><body>404</body></html>", "m.toml: is XML, and TOML is read here"),
         (
             "a = 1\nmass = 8.0e3x\n",
             "m.toml:2: not TOML: expected newline or end of document after a statement, in 'mass = 8.0e3x'",

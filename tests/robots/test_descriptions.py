@@ -403,3 +403,16 @@ def test_a_velocity_limit_that_is_none_is_refused(tmp_path: Path, number: str) -
 def test_a_model_that_attaches_others_is_refused(tmp_path: Path) -> None:
     text = ARM.replace("<worldbody>", '<asset><model name="x" file="/etc/hostname"/></asset><worldbody>')
     assert "to_xml()" in refusal(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(("tag", "name"), [("joint", "turn"), ("link", "arm")])
+def test_names_that_stand_twice_in_a_urdf_are_refused(tmp_path: Path, tag: str, name: str) -> None:
+    # MuJoCo keeps the first and makes the second nameless, so that a log would be read for the wrong axis.
+    text = (
+        '<robot name="r"><link name="base"/><link name="arm"/><link name="fore"/>'
+        '<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/></joint>'
+        '<joint name="bend" type="revolute"><parent link="arm"/><child link="fore"/></joint></robot>'
+    )
+    other = {"joint": "bend", "link": "fore"}[tag]
+    doubled = text.replace(f'<{tag} name="{other}"', f'<{tag} name="{name}"')
+    assert f"two {tag}s are called '{name}'" in refusal(written(tmp_path, doubled, "a.urdf"))
