@@ -67,7 +67,7 @@ def test_transfer_functions_that_are_not_shown_are_told(tmp_path):
     assert "those of second.mcap" in both.findings[-1]
 
 
-@pytest.mark.parametrize("last", ["modes", "log"])
+@pytest.mark.parametrize("last", ["modes", pytest.param("log", marks=pytest.mark.nightly)])
 def test_modes_are_checked_with_the_geometry_whichever_comes_first(tmp_path, last):
     with chladni.open_log(write_arm(tmp_path), setup=tmp_path / "setup.toml") as log:
         modes = chladni.identify_modes(log, references=FORCE)

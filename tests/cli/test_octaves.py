@@ -35,6 +35,7 @@ def test_programs_get_bands_with_their_frequencies_and_levels(run, log):
     assert casing["rms"] == pytest.approx(3 / np.sqrt(2), rel=1e-3)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("fraction", "called"), [(1, "octave"), (12, "1/12 octave")])
 def test_people_get_a_table_a_quantity(run, log, tmp_path, fraction, called):
     outcome = run("octaves", log, "--fraction", fraction, "--figures", tmp_path)

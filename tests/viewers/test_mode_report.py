@@ -64,7 +64,7 @@ def test_relative_motion_of_a_large_structure_is_cut_and_told() -> None:
 def test_method_error_and_scale_are_told(arm: str) -> None:
     told = next(text for text in Page(arm).texts if text.startswith("Method: made up."))
     assert "± is one sigma." in told
-    assert "Error of the synthesis: 2.8%." in told
+    assert "Error of the synthesis of the modes: 2.8%." in told
     assert "Scaled at /tool.accel.linear.x over /shaker.wrench.force.x" in told
 
 

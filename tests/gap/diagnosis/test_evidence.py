@@ -56,6 +56,7 @@ def both() -> Study:
     return studied(FRICTION, SPRING, off={})
 
 
+@pytest.mark.nightly
 def test_of_two_forces_each_is_the_one_that_acts_at_its_site(both: Study) -> None:
     elbow, hand = evidence(both, believing(both), named(FRICTION, SPRING))
     assert (elbow.site.name, hand.site.name) == ("elbow", "hand")

@@ -95,6 +95,7 @@ def test_the_machine_has_the_numbers_that_were_found(friction_and_mass: Solved) 
     assert machine.joints[0].delay_s == 0.0
 
 
+@pytest.mark.nightly
 def test_a_delay_of_all_commands_and_weak_gains(tmp_path: Path) -> None:
     late = torques(tmp_path, servo=f' delay="{DELAY_S}" nsample="40"', kp="96")
     found = found_by(late)

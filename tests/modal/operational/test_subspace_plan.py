@@ -49,6 +49,7 @@ def test_a_record_sampled_faster_than_its_peaks_need_is_decimated():
     assert "anti-alias" in chosen.notes[0]
 
 
+@pytest.mark.nightly
 def test_low_modes_far_below_high_ones_are_told_of():
     record = resonance((0.4, 90.0), 400.0, 3000, channels=12)
     chosen = plan(record)

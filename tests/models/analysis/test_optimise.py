@@ -53,6 +53,7 @@ def test_a_damping_ratio_is_met_by_its_closed_form() -> None:
     assert best.values["c"] == pytest.approx(2 * 0.5 * 2.0, rel=1e-5)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_an_aim_is_subject_to_its_limits() -> None:
     wishes = [least_answer_time(), overshoot_at_most(5.0)]

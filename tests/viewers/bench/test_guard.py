@@ -185,6 +185,7 @@ def test_pages_that_no_browser_joins_are_few_and_soon_gone(
     until(lambda: server.open_pages == 0)
 
 
+@pytest.mark.nightly
 def test_of_many_that_ask_at_once_most_are_told_to_wait(
     server: Any, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -196,6 +197,7 @@ def test_of_many_that_ask_at_once_most_are_told_to_wait(
     assert statuses.count(503) == 38
 
 
+@pytest.mark.nightly
 def test_a_page_that_is_closed_makes_room_at_once(server: Any, port: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chladni.viewers.bench.guard.MOST_PAGES", 1)
     # As somebody who reloads again and again.
@@ -205,6 +207,7 @@ def test_a_page_that_is_closed_makes_room_at_once(server: Any, port: int, monkey
         until(lambda: len(server._application.joined) == 0)
 
 
+@pytest.mark.nightly
 def test_a_browser_that_leaves_at_once_leaves_no_page(server: Any, port: int) -> None:
     for _ in range(2):
         token = wire.ask(port, f"/{NAME}").token

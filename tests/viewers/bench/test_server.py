@@ -43,7 +43,9 @@ def upgrade(port: int, host: str, origin: str) -> str:
 
 
 @pytest.mark.parametrize("path", ["/", "/oscillator", "/static/js/bokeh.min.js"])
-@pytest.mark.parametrize("name", ["127.0.0.1", "localhost", "LOCALHOST"])
+@pytest.mark.parametrize(
+    "name", ["127.0.0.1", *(pytest.param(one, marks=pytest.mark.nightly) for one in ("localhost", "LOCALHOST"))]
+)
 def test_this_computers_names_are_answered(server: Any, path: str, name: str) -> None:
     assert get(server.port, path, f"{name}:{server.port}").startswith("HTTP/1.1 200")
 

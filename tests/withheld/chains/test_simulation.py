@@ -203,6 +203,7 @@ SAME = [
 ]  # fmt: skip
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("law", "site", "hidden", "effect", "values", "more"), SAME, ids=[one[0] for one in SAME])
 def test_the_sign_of_a_law_is_that_of_its_word(law, site, hidden, effect, values, more, tmp_path):
     rng = np.random.default_rng(11)
@@ -305,6 +306,7 @@ IN_LOOP = [
 ]  # fmt: skip
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("law", "site", "hidden", "effect", "values", "more"), IN_LOOP, ids=[f"{o[0]}-{o[1]}" for o in IN_LOOP]
 )

@@ -104,6 +104,7 @@ def _friction(_d, s, z):
     return 2e5 * z[0] + 5.0 * rate, [rate]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("numbers", "code", "law", "method", "states"),
     [
