@@ -312,7 +312,8 @@ class _Run:
         path = np.full_like(ahead, np.nan)
         bound, carry, is_soft = self._bound(), self._carried(span), between.any
         for place in range(len(ahead)):
-            carry(place)
+            if carry is not None:
+                carry(place)
             position, velocity = qpos[places], qvel[dofs]
             if is_soft:
                 path[place] = between.logged(position)
@@ -330,11 +331,11 @@ class _Run:
                 break
         return path
 
-    def _carried(self, span: slice) -> Callable[[int], None]:
+    def _carried(self, span: slice) -> Callable[[int], None] | None:
         """Give what makes a base that floats feel at each step what it felt: it's as heavy as what holds it."""
         base, moved = self._base, self._driven.base
         if base is None or moved is None:
-            return lambda _: None
+            return None
         turn, data = self._mujoco.mju_rotVecQuat, self._data
         quaternion, speed, push = (
             data.qpos[base.position + 3 : base.position + 7],

@@ -26,7 +26,7 @@ from chladni.gap.records.diagnosis import (
     Where,
 )
 from chladni.gap.robots.contest import Contest, Fit
-from chladni.gap.robots.forward import Confirmed, Trial, machine_of
+from chladni.gap.robots.forward import machine_of
 from chladni.gap.robots.next_measurement import next_measurement
 from chladni.gap.robots.pictures import joint_motion, torque_maps, torque_signals
 from chladni.gap.robots.pushes import Push
@@ -35,6 +35,7 @@ from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.solved import Solved
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import Torques
+from chladni.gap.robots.trial import Confirmed, Trial
 from chladni.gap.robots.tuned import tuned_parameters
 from chladni.robots.dynamics import inertial_numbers
 from chladni.signals.arrays import Mask, Real

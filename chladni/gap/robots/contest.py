@@ -14,7 +14,7 @@ from scipy.optimize import nnls
 from chladni.gap.calibration import ANOTHER, DETAILS, QUARTER
 from chladni.gap.records.diagnosis import PARAMETER
 from chladni.gap.robots.joints_left import JointsLeft
-from chladni.gap.robots.row import Row, columns_of_rows
+from chladni.gap.robots.row import Row, columns_of_rows, parts_of
 from chladni.gap.robots.term import FOUND, Term
 from chladni.gap.robots.tolerances import tolerances
 from chladni.gap.robots.torques import RIGHT, Torques
@@ -108,8 +108,8 @@ class Contest:
             id(term): np.arange(a, a + len(term.scale)) for term, a in zip(self.terms, starts, strict=False)
         }
         self._size = int(starts[-1])
-        whole = (np.tensordot(self._told, inside, 1), np.ones(self.within))
-        columns = columns_of_rows(len(torques.missing), [whole, *((term.columns, term.scale) for term in self.terms)])
+        whole = (parts_of(np.tensordot(self._told, inside, 1)), np.ones(self.within))
+        columns = columns_of_rows(torques.missing.shape, [whole, *((term.parts, term.scale) for term in self.terms)])
         self._rows = tuple(self._row(row, *each) for row, each in enumerate(columns))
         self.count = torques.numbers_a_sample * np.sum(there, axis=1)
         self._energy = np.sum((torques.missing * self._whiten) ** 2, axis=1)
@@ -151,7 +151,7 @@ class Contest:
     def joined(self, term: Term) -> "Contest":
         """Give the contest with one term more, at the same prices."""
         first, count = self._size, len(term.numbers)
-        more = columns_of_rows(len(self._rows), [(term.columns, term.scale)])
+        more = columns_of_rows(self.torques.missing.shape, [(term.parts, term.scale)])
         both = tuple(
             self._row(row, np.concatenate([one.numbers, first + numbers]), np.concatenate([one.columns, columns]))
             if numbers.size

@@ -1,12 +1,10 @@
-"""Confirmation by simulation: the description, and with what was found, run from the log's poses by its commands."""
+"""The machine that a fit says a description stands for, and its runs from the log's poses by its commands."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.calibration import SAME
 from chladni.gap.robots.contest import Contest, Fit
 from chladni.gap.robots.joint_words import ALONG_THE_WAY, way_of
 from chladni.gap.robots.term import Term
@@ -27,70 +25,12 @@ from chladni.robots.machine import (
     as_described,
     physical,
 )
-from chladni.signals.arrays import Mask, Real
+from chladni.signals.arrays import Real
 
-#: Least length of the blocks of which every other one judges, in periods of the cutoff.
-_PERIODS = 16.0
 _ROUNDING = 1e-6
 #: Standard deviations of a tolerance that a value may stand aside.
 _INSIDE = 3.0
 _ANGLES = ("gravity_tilt", "misalignment")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Confirmed:
-    """What simulation says of the description as it is, and with what was found.
-
-    Attributes
-    ----------
-    before, tuned, after
-        Error of the simulated positions over the motion, both RMS on the stretches held out, pooled over joints that
-        move; infinite where a run goes astray. Of the description, of the same within its tolerances, and with what
-        was found.
-    joints
-        Names.
-    per_joint_before, per_joint_tuned, per_joint_after
-        ``[joint]``: the same of each; NaN where it doesn't move.
-    motion
-        ``[joint]``: RMS of the measured position about its mean, rad (m).
-    time_s
-        ``[sample]`` from the log's start.
-    measured, simulated_before, simulated_tuned, simulated_after
-        ``[joint, sample]`` positions; NaN where nothing was run.
-    judged
-        ``[sample]``: the stretches that judge.
-    horizon_s
-        How long a run lasts before it starts from the log's pose again.
-    held_out
-        Whether no fit saw what judges; False when the log is too short for that.
-    """
-
-    before: float
-    tuned: float
-    after: float
-    joints: tuple[str, ...]
-    per_joint_before: Real
-    per_joint_tuned: Real
-    per_joint_after: Real
-    motion: Real
-    time_s: Real
-    measured: Real
-    simulated_before: Real
-    simulated_tuned: Real
-    simulated_after: Real
-    judged: Mask
-    horizon_s: float
-    held_out: bool
-
-    @property
-    def denies(self) -> bool:
-        """Whether positions come out worse with what was found than without it, or not at all."""
-        return self.after > self.tuned or self.after > 1.0
-
-    @property
-    def worse(self) -> Mask:
-        """``[joint]``: whether its position comes out clearly worse with what was found than without it."""
-        return np.asarray(self.per_joint_after > SAME * self.per_joint_tuned)
 
 
 def machine_of(contest: Contest, fit: Fit) -> Machine:
@@ -298,88 +238,6 @@ _LAWS: Mapping[str, Law] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Trial:
-    """Runs of a log's machines from its poses, by its commands.
-
-    Every other block of the log judges what was fitted to the rest. A run lasts a block where the drives hold
-    positions, and a period of the cutoff where torques or speeds are asked, since then nothing brings a joint back.
-    """
-
-    torques: Torques
-
-    def of(self, terms: Sequence[Term]) -> Confirmed | None:
-        """Run the description, and the machine that was found.
-
-        Returns
-        -------
-        Confirmed | None
-            None where the drive of a joint isn't known: then it can't be run.
-        """
-        if not np.all(self.torques.driven):
-            return None
-        courses = [self._described, self._tuned, self._run(terms)]
-        judge = self._judge if self._held_out else np.ones_like(self._judge)
-        return _told(self.torques, courses, judge, self._runs, held_out=self._held_out)
-
-    @cached_property
-    def _described(self) -> Real:
-        """``[joint, sample]``: as the description has it, whatever was found."""
-        memory = self.torques.memory
-        if "as described" not in memory:
-            memory["as described"] = simulated(as_described(self.torques.robot), self.torques, self._runs)
-        return np.asarray(memory["as described"])
-
-    @cached_property
-    def _tuned(self) -> Real:
-        return self._run(())
-
-    def _run(self, terms: Sequence[Term]) -> Real:
-        contest = Contest(self.torques, terms=terms, taking_part=self._learns)
-        return simulated(machine_of(contest, contest.fit(terms)), self.torques, self._runs)
-
-    @property
-    def _learns(self) -> Mask | None:
-        """``[coarse]``: what machines are fitted to; all of it when None."""
-        return ~self._judge[self.torques.kept] if self._held_out else None
-
-    @cached_property
-    def _parts(self) -> tuple[list[tuple[int, int]], Mask]:
-        return _blocks(self.torques)
-
-    @property
-    def _judge(self) -> Mask:
-        return self._parts[1]
-
-    @property
-    def _held_out(self) -> bool:
-        return len(self._parts[0]) > 1
-
-    @cached_property
-    def _runs(self) -> list[tuple[int, int]]:
-        return _runs(self.torques, self._parts[0])
-
-
-def _blocks(torques: Torques) -> tuple[list[tuple[int, int]], Mask]:
-    """First and last sample of each block, and the samples of every other one."""
-    rate, found = torques.log.sample_rate_hz, []
-    least = max(int(_PERIODS / torques.cutoff_hz * rate), 2)
-    for a, b in torques.stretches:
-        edges = np.linspace(a, b, max((b - a) // least, 1) + 1).astype(np.intp)
-        found += list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
-    judge = np.zeros(torques.log.position.shape[1], dtype=bool)
-    for a, b in found[1::2]:
-        judge[a:b] = True
-    return found, judge
-
-
-def _runs(torques: Torques, blocks: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    if torques.log.command_kind == "position" and not _by_effort(torques):
-        return blocks
-    count = max(round(torques.log.sample_rate_hz / torques.cutoff_hz), 2)
-    return [(start, min(start + count, b)) for a, b in blocks for start in range(a, b, count)]
-
-
 def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -> Real:
     """Give ``[joint, sample]``: what the log would read of a machine, run between samples from the log's poses.
 
@@ -411,7 +269,7 @@ def simulated(machine: Machine, torques: Torques, runs: list[tuple[int, int]]) -
     return found
 
 
-def _by_effort(torques: Torques) -> bool:
+def by_effort(torques: Torques) -> bool:
     """Whether runs are driven by efforts: where loops are known they hold the joints near where they were."""
     return torques.by_effort and not (torques.two_sided and bool(np.all(np.isfinite(torques.by_row("kp")))))
 
@@ -432,14 +290,14 @@ def _base(machine: Machine, torques: Torques, at_s: Real) -> BaseMotion | None:
 
 
 def _kinds(torques: Torques) -> tuple[str, ...]:
-    kind = "effort" if _by_effort(torques) else torques.log.command_kind or "effort"
+    kind = "effort" if by_effort(torques) else torques.log.command_kind or "effort"
     return (kind,) * len(torques.log.joints)
 
 
 def _asked(machine: Machine, torques: Torques, at_s: Real, step_s: float) -> Real:
     """``[joint, step]``: commands as they arrive, held, over half a step before and after; or measured efforts."""
     log = torques.log
-    if _by_effort(torques):
+    if by_effort(torques):
         return np.array([np.interp(at_s, log.time_s, row) for row in torques.unlimited])
     late = {one.joint.name: one.delay_s for one in machine.joints}
     found = np.zeros((len(log.joints), at_s.size))
@@ -448,23 +306,3 @@ def _asked(machine: Machine, torques: Torques, at_s: Real, step_s: float) -> Rea
             place = np.searchsorted(starts, at_s + aside * step_s - late[name], side="right") - 1
             found[row] += 0.5 * values[np.maximum(place, 0)]
     return found
-
-
-def _told(
-    torques: Torques, courses: Sequence[Real], judge: Mask, runs: list[tuple[int, int]], *, held_out: bool
-) -> Confirmed:
-    measured = torques.log.position
-    there = judge & ~np.isnan(courses).any(axis=(0, 1))
-    about = measured[:, there] - np.mean(measured[:, there], axis=1, keepdims=True)
-    motion = np.sqrt(np.mean(about**2, axis=1))
-    moves = motion > torques.resolution
-    size = np.where(moves, motion, np.nan)
-    per_joint = [np.sqrt(np.mean((one[:, there] - measured[:, there]) ** 2, axis=1)) / size for one in courses]
-    whole = [float(np.sqrt(np.mean(one[moves] ** 2))) if moves.any() else float("nan") for one in per_joint]
-    return Confirmed(
-        before=whole[0], tuned=whole[1], after=whole[2], joints=torques.log.joints,
-        per_joint_before=per_joint[0], per_joint_tuned=per_joint[1], per_joint_after=per_joint[2], motion=motion,
-        time_s=torques.log.time_s, measured=measured, simulated_before=courses[0], simulated_tuned=courses[1],
-        simulated_after=courses[2], judged=there, held_out=held_out,
-        horizon_s=max(b - a for a, b in runs) / torques.log.sample_rate_hz,
-    )  # fmt: skip

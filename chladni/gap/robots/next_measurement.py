@@ -290,8 +290,8 @@ def _predicted(fit: Fit, here: Sequence[Term], laid: Torques) -> Real:
         # Where a motion asks for less than a limit a law has no part beyond it.
         like = _like(here, term)
         numbers = np.array([told.get(one.name, one.about) - one.nominal for one in like.numbers])
-        part = np.tensordot(numbers, like.columns, 1)
-        found[: len(part)] += part
+        for row, part in like.explains(numbers).items():
+            found[row] += part
     return found
 
 

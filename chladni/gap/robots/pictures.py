@@ -8,9 +8,9 @@ from chladni.gap.comparison.shares import gap_map
 from chladni.gap.records.diagnosis import GapSignals
 from chladni.gap.records.robot import JointMotion, Over, TorqueMap
 from chladni.gap.robots.contest import Contest, Fit
-from chladni.gap.robots.forward import Confirmed
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import Torques
+from chladni.gap.robots.trial import Confirmed
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Index, Real
 
@@ -93,8 +93,8 @@ def joint_motion(torques: Torques, found: Confirmed | None, *, named: bool) -> J
 def _courses(found: Confirmed, *, named: bool) -> tuple[Real | None, Real | None]:
     """Simulations before and after; None of one that is farther from the log than a robot that stands still."""
     errors = (found.before, found.after if named else found.tuned)
-    courses = (found.simulated_before, found.simulated_after if named else found.simulated_tuned)
-    before, after = (one if error <= 1.0 else None for error, one in zip(errors, courses, strict=True))
+    courses = (found.course_before, found.course_after if named else found.course_tuned)
+    before, after = (one.whole if error <= 1.0 else None for error, one in zip(errors, courses, strict=True))
     return before, after
 
 
@@ -186,9 +186,9 @@ def _over(term: Term) -> Over:
     return "velocity" if term.word in _BY_SPEED else "position"
 
 
-def _added(term: Term, values: Real, row: int) -> Real:
+def _added(term: Term, values: Real, row: int) -> Real | float:
     """``[coarse]``: missing torque that a law explains at a joint."""
-    return np.asarray((values - term.nominal) @ term.columns[:, row])
+    return term.explains(values - term.nominal).get(row, 0.0)
 
 
 def _about_line(x: Real, y: Real) -> float:

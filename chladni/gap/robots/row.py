@@ -52,24 +52,36 @@ class Row:
         )
 
 
-def columns_of_rows(rows: int, blocks: Sequence[tuple[Real, Real]]) -> list[tuple[Index, Real]]:
+#: Of each row at which a block of numbers acts: the row, places of those that do, and columns ``[acting, coarse]``.
+Parts = tuple[tuple[int, Index, Real], ...]
+
+
+def parts_of(columns: Real) -> Parts:
+    """Give the parts of columns ``[number, row, coarse]``, most of which are zero."""
+    acts = np.any(columns, axis=2)
+    return tuple(
+        (int(row), np.flatnonzero(acts[:, row]), columns[acts[:, row], row])
+        for row in np.flatnonzero(np.any(acts, axis=0))
+    )
+
+
+def columns_of_rows(shape: tuple[int, ...], blocks: Sequence[tuple[Parts, Real]]) -> list[tuple[Index, Real]]:
     """Give of each row the numbers that act there, and their columns ``[acting, coarse]`` over the scales.
 
     Parameters
     ----------
+    shape
+        ``[row, coarse]``.
     blocks
-        Columns ``[number, row, coarse]``, of which the rows of loops may be missing, and scales ``[number]``; one
-        behind the other.
+        Parts, and scales ``[number]``; one behind the other.
     """
-    none = np.zeros((0, blocks[0][0].shape[2]))
+    rows, none = shape[0], np.zeros((0, shape[1]))
     numbers: list[list[Index]] = [[np.zeros(0, dtype=np.intp)] for _ in range(rows)]
     columns: list[list[Real]] = [[none] for _ in range(rows)]
     first = 0
-    for block, scale in blocks:
-        acts = np.any(block, axis=2)
-        for row in np.flatnonzero(np.any(acts, axis=0)):
-            here = acts[:, row]
-            numbers[row].append(first + np.flatnonzero(here))
-            columns[row].append(block[here, row] * scale[here, None])
-        first += len(block)
+    for parts, scale in blocks:
+        for row, acting, own in parts:
+            numbers[row].append(first + acting)
+            columns[row].append(own * scale[acting, None])
+        first += len(scale)
     return [(np.concatenate(own), np.concatenate(each)) for own, each in zip(numbers, columns, strict=True)]

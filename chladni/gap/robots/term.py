@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from chladni.gap.robots.row import Parts, parts_of
 from chladni.gap.robots.torques import Torques
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
@@ -94,7 +95,8 @@ class Term:
     word, site, variant
         What, where, and which kind of it.
     make
-        Gives the columns.
+        Gives the columns ``[number, row, coarse]``: missing torque a unit of each number; rows of the loops may be
+        left out.
     numbers
         One a column.
     rows
@@ -133,12 +135,16 @@ class Term:
     ratio: float | None = None
 
     @cached_property
-    def columns(self) -> Real:
-        """``[number, row, coarse]``: missing torque a unit of each number; rows of the loops may be left out.
+    def parts(self) -> Parts:
+        """Missing torque a unit of each number, where it acts.
 
-        Made when they're asked for: most words don't take part where a motion is laid out.
+        Made when it's asked for: most words don't take part where a motion is laid out.
         """
-        return self.make()
+        return parts_of(self.make())
+
+    def explains(self, numbers: Real) -> dict[int, Real]:
+        """Give ``[coarse]`` by row: missing torque that numbers beside the nominal ones explain."""
+        return {row: numbers[acting] @ columns for row, acting, columns in self.parts}
 
     @cached_property
     def key(self) -> tuple[str, str]:

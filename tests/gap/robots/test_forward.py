@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from chladni.gap.robots.contest import Contest
-from chladni.gap.robots.forward import Confirmed, Trial, machine_of, simulated
+from chladni.gap.robots.forward import machine_of, simulated
 from chladni.gap.robots.solved import Solved, solved
 from chladni.gap.robots.torques import Torques, torques_of
+from chladni.gap.robots.trial import Confirmed, Trial
 from chladni.robots.machine import Coupling, as_described
 from chladni.robots.robot import RobotTolerance
 from tests.robots.machines import (
@@ -80,7 +81,7 @@ def assert_told(found: Confirmed) -> None:
     there = found.judged
     assert 0 < np.count_nonzero(there) < there.size
     motion = np.std(found.measured[:, there], axis=1)
-    errors = found.simulated_before[:, there] - found.measured[:, there]
+    errors = found.course_before.whole[:, there] - found.measured[:, there]
     np.testing.assert_allclose(found.per_joint_before, np.sqrt(np.mean(errors**2, axis=1)) / motion)
     np.testing.assert_allclose(found.motion, motion)
     assert found.before == pytest.approx(np.sqrt(np.mean(found.per_joint_before**2)))

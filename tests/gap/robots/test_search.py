@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chladni.gap.robots.contest import Contest, Fit
-from chladni.gap.robots.row import Row, columns_of_rows
+from chladni.gap.robots.row import Row, columns_of_rows, parts_of
 from chladni.gap.robots.search import alternatives, searched
 from chladni.gap.robots.solved import Solved, solved
 from chladni.gap.robots.torques import ALL_COMMANDS, torques_of
@@ -104,7 +104,10 @@ def test_moments_of_a_row_are_those_of_all_its_columns(seed: int, acting: list[b
     # The last row has no columns at all, as those of loops.
     block = random.standard_normal((len(acting), 2, 16)) * np.array(acting)[:, None, None]
     whiten, missing = random.uniform(0.5, 2.0, 16), random.standard_normal(16)
-    rows = [Row.of(numbers, columns, whiten, missing) for numbers, columns in columns_of_rows(3, [(block, scale)])]
+    rows = [
+        Row.of(numbers, columns, whiten, missing)
+        for numbers, columns in columns_of_rows((3, 16), [(parts_of(block), scale)])
+    ]
     for place, row in enumerate(rows):
         whole = block[:, place] * scale[:, None] if place < 2 else np.zeros((len(acting), 16))
         chosen = random.permutation(len(acting))[: max(len(acting) // 2, 1)]
