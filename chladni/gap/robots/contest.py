@@ -1,7 +1,7 @@
 """Fits of sets of terms to the missing torque of all joints at once, and their evidence."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -211,10 +211,21 @@ class Contest:
 
     def tolerances(self, fit: Fit) -> dict[str, tuple[float, float]]:
         """Give what a fit says of numbers in their tolerances: value and standard deviation, over the tolerance."""
-        values = fit.numbers[: self.within] @ self._told
-        narrowed = np.eye(self.within) - fit.covariance[: self.within, : self.within]
-        deviations = np.sqrt(np.maximum(1.0 - np.einsum("pn,pq,qn->n", self._told, narrowed, self._told), 0.0))
+        values, covariance = self._within(fit)
+        deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return dict(zip(self._tolerated, zip(values.tolist(), deviations.tolist(), strict=True), strict=True))
+
+    def together(self, fit: Fit, weights: Mapping[str, float]) -> tuple[float, float]:
+        """Give what a fit says of a weighted sum of numbers in their tolerances: value and standard deviation."""
+        weight = np.array([weights.get(name, 0.0) for name in self._tolerated])
+        values, covariance = self._within(fit)
+        return float(weight @ values), float(np.sqrt(max(weight @ covariance @ weight, 0.0)))
+
+    def _within(self, fit: Fit) -> tuple[Real, Real]:
+        """``[tolerance]`` and ``[tolerance, tolerance]``: values and covariance, over the tolerances."""
+        told, own = self._told, slice(self.within)
+        narrowed = np.eye(self.within) - fit.covariance[own, own]
+        return fit.numbers[own] @ told, np.eye(told.shape[1]) - told.T @ narrowed @ told
 
     def again(self, fit: Fit) -> Fit:
         """Fit a set of another contest, of the same words at the same sites."""

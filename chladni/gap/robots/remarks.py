@@ -6,6 +6,7 @@ import numpy as np
 
 from chladni.gap.robots.pushes import Push
 from chladni.gap.robots.solved import Solved
+from chladni.gap.robots.tuned import Pulled, pulled_masses
 from chladni.io.log_info import some_of
 
 #: Share of a log in which a joint has to move.
@@ -19,6 +20,7 @@ def remarks_on(solved: Solved, unexplained: Sequence[str], *, named: bool) -> tu
         *torques.robot.remarks,
         *torques.log.remarks,
         *_of_joints(solved),
+        *(_pulled(one) for one in pulled_masses(solved)),
         *(_pushed(one) for one in solved.pushes if named),
         *(
             [f"at {some_of(unexplained)} no word explains what is missing beside the named causes"]
@@ -32,6 +34,17 @@ def _pushed(one: Push) -> str:
     return (
         f"something pushes at {some_of(one.joints)} from {one.start_s:.2f} s to {one.end_s:.2f} s, by up to "
         f"{one.torque:.3g} {one.unit}; those seconds told nothing of the causes"
+    )
+
+
+def _pulled(one: Pulled) -> str:
+    first, *others = one.links
+    whose = f"{first} with {some_of(others)}" if others else first
+    way = "more" if one.change > 0 else "less"
+    return (
+        f"the log asks for {abs(one.change):.2g} ± {one.std:.1g} kg {way} at {whose}, "
+        f"{abs(one.over_tolerance):.2g} times the tolerance, which holds it back; weigh it, or raise inertia under "
+        "[tolerance]"
     )
 
 
