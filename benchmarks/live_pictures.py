@@ -98,7 +98,7 @@ def play(options: argparse.Namespace, port: int) -> int:
     recording.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy")
     drawing, next_s = LiveDrawing(recording), EVERY_S
     with tempfile.TemporaryDirectory() as folder:
-        write_mcap(make_demo_log().series, Path(folder) / "whole.mcap", layout="batches", block_s=0.1)
+        write_mcap(make_demo_log().series, Path(folder) / "whole.mcap", layout="messages")
         path = Path(folder) / "arm.mcap"
         path.touch()
         content = in_small_chunks(Path(folder) / "whole.mcap")

@@ -27,6 +27,24 @@ MOST_SAMPLES = 1 << 23
 LEAST_REACH = 64
 
 
+class SharedTransforms:
+    """Transform of the samples that were filtered last, for filters that are fed the same blocks in turn.
+
+    Which samples they are is told by the run and the place in it; a filter that is elsewhere makes its own.
+    """
+
+    def __init__(self) -> None:
+        self._key: tuple[int, int, int] | None = None
+        self._spectrum = np.empty(0, np.complex128)
+
+    def of(self, values: Real, length: int, *, run_ns: int, place: int) -> NDArray[np.complexfloating]:
+        """Give ``[channel, line]`` of `values` that begin at a place of the run which starts at `run_ns`."""
+        key = (run_ns, place, values.shape[1])
+        if self._key != key:
+            self._key, self._spectrum = key, np.asarray(scipy.fft.rfft(values, length), np.complex128)
+        return self._spectrum
+
+
 class BandFilter:
     """A filter without phase shift that has the magnitude of a Butterworth band-pass of third order.
 
@@ -45,6 +63,8 @@ class BandFilter:
         How often motions are integrated over time; the band must then begin above 0.
     envelope
         Whether to give the squared envelope of what passes, abs(x + j Hilbert(x))^2, in place of it.
+    transforms
+        Shared with filters of the same band that are fed the same blocks, and integrate more or less often.
 
     Raises
     ------
@@ -58,7 +78,13 @@ class BandFilter:
     """
 
     def __init__(
-        self, sample_rate_hz: float, band_hz: tuple[float, float], *, integrations: int = 0, envelope: bool = False
+        self,
+        sample_rate_hz: float,
+        band_hz: tuple[float, float],
+        *,
+        integrations: int = 0,
+        envelope: bool = False,
+        transforms: SharedTransforms | None = None,
     ) -> None:
         low_hz, high_hz = band_hz
         if not 0 <= low_hz < high_hz <= sample_rate_hz / 2 * (1 + 1e-9):
@@ -72,6 +98,7 @@ class BandFilter:
         self.band_hz = (low_hz, min(high_hz, sample_rate_hz / 2))
         self.integrations = integrations
         self.envelope = envelope
+        self._transforms = transforms
         self._reach = self._samples_of_decay()
         self._response = self._impulse_response()
         self._runs = Runs()
@@ -151,7 +178,7 @@ class BandFilter:
         joined = self._held.joined().astype(np.float64, copy=False)
         start_s = (self._taken + self._reach) / self.sample_rate_hz
         yield TimeSeries(
-            values=self._convolved(joined),
+            values=self._convolved(joined, self._first.start_time_ns),
             sample_rate_hz=self.sample_rate_hz,
             channels=self.passed(self._first.channels),
             start_time_ns=self._first.start_time_ns + round(start_s * NS_PER_S),
@@ -159,13 +186,17 @@ class BandFilter:
         self._taken += new
         self._held.replace(joined[:, new:])
 
-    def _convolved(self, values: Real) -> Real:
+    def _convolved(self, values: Real, run_ns: int) -> Real:
         """``[channel, sample]`` where the impulse response lies on samples from end to end."""
         length = scipy.fft.next_fast_len(values.shape[1], real=not self.envelope)
         kept = slice(2 * self._reach, values.shape[1])
         if not self.envelope:
+            if self._transforms is None:
+                transformed = scipy.fft.rfft(values, length)
+            else:
+                transformed = self._transforms.of(values, length, run_ns=run_ns, place=self._taken)
             spectrum = scipy.fft.rfft(self._response.real, length)
-            return np.asarray(scipy.fft.irfft(scipy.fft.rfft(values, length) * spectrum, length)[:, kept])
+            return np.asarray(scipy.fft.irfft(transformed * spectrum, length)[:, kept])
         spectrum = scipy.fft.fft(self._response, length)
         passed = scipy.fft.ifft(scipy.fft.fft(values, length) * spectrum, length)[:, kept]
         return np.asarray(passed.real**2 + passed.imag**2)

@@ -15,7 +15,7 @@ from chladni.signals.number_range import LARGEST, require_in_range
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.spectral.accumulator import require_finite
 from chladni.spectral.averaging import require_shapes
-from chladni.spectral.band_filter import BandFilter
+from chladni.spectral.band_filter import BandFilter, SharedTransforms
 from chladni.spectral.blocks import Margins, Numbers, Own, leading_part, sum_up
 from chladni.spectral.stretches import valid_runs
 
@@ -111,6 +111,7 @@ class LevelsAccumulator:
         bands_hz: Sequence[tuple[float, float]] | None = None,
         running_s: float | None = None,
         integrations: int = 0,
+        transforms: SharedTransforms | None = None,
     ) -> None:
         if bands_hz is None and integrations:
             raise EstimateError("integration needs a band that begins above 0 Hz; below it a drift has no end")
@@ -123,7 +124,10 @@ class LevelsAccumulator:
             )
         self.channels = tuple(channels)
         self.sample_rate_hz = sample_rate_hz
-        self._filters = [BandFilter(sample_rate_hz, band, integrations=integrations) for band in bands_hz or ()]
+        self._filters = [
+            BandFilter(sample_rate_hz, band, integrations=integrations, transforms=transforms)
+            for band in bands_hz or ()
+        ]
         window = max(LEAST_SAMPLES, round((running_s or FAST_S) * sample_rate_hz))
         self._windows = [_Windows(len(self.channels), window) for _ in range(max(1, len(self._filters)))]
         self._start_ns: int | None = None

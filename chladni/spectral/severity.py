@@ -12,6 +12,7 @@ from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.levels import Levels, RunningLevels, Severity
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import shown
+from chladni.spectral.band_filter import SharedTransforms
 from chladni.spectral.blocks import Margins, Numbers, Own, leading_part, sum_up
 from chladni.spectral.levels import LevelsAccumulator
 
@@ -130,10 +131,14 @@ class SeverityAccumulator:
         self._measured: dict[tuple[str, ...], tuple[LevelsAccumulator, LevelsAccumulator]] = {}
         for unit, integrations in _INTEGRATIONS.items():
             if motions := [channel for channel in channels if channel.unit == unit]:
-                self._measured[tuple(channel.name for channel in motions)] = (
-                    LevelsAccumulator(motions, sample_rate_hz, bands_hz=[passed_hz], integrations=integrations),
-                    LevelsAccumulator(motions, sample_rate_hz, bands_hz=[passed_hz], integrations=integrations + 1),
+                transforms = SharedTransforms()
+                velocity, displacement = (
+                    LevelsAccumulator(
+                        motions, sample_rate_hz, bands_hz=[passed_hz], integrations=often, transforms=transforms
+                    )
+                    for often in (integrations, integrations + 1)
                 )
+                self._measured[tuple(channel.name for channel in motions)] = velocity, displacement
         if not self._measured:
             raise EstimateError(
                 "severity needs an acceleration [m/s^2] or a velocity [m/s], and there is none; name the units in a "

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ def zoom_of_blocks(
     window: Window = "hann",
     quantity: Quantity = "peak",
 ) -> AmplitudeSpectrum:
-    """Zoom into blocks, which are read twice: where the longest run lies must be known before it's weighted.
+    """Zoom into blocks; several are read twice: where the longest run lies must be known before it's weighted.
 
     Parameters
     ----------
@@ -103,7 +104,7 @@ def zoom_of_blocks(
     band_hz, lines, window, quantity
         As for `zoom_spectrum`.
     """
-    whole = read()
+    whole = _single(read())
     run = _longest_run(whole)
     low_hz, high_hz = band_hz
     if not 0 <= low_hz < high_hz <= run.sample_rate_hz / 2:
@@ -134,6 +135,15 @@ def zoom_of_blocks(
             notes=(f"tones closer than {noise_bandwidth_bins(shape) / segment_s:.3g} Hz run together",),
         ),
     )
+
+
+def _single(source: TimeSeries | Blocks) -> TimeSeries | Blocks:
+    """Give a lone block as the series that it is: it needn't be read again."""
+    if isinstance(source, TimeSeries):
+        return source
+    blocks = iter(source)
+    begun = [*islice(blocks, 2)]
+    return begun[0] if len(begun) == 1 else chain(begun, blocks)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+import scipy.fft
 
 from chladni.signals.errors import EstimateError, SetupError
-from chladni.spectral.severity import BOUNDARIES_MM_S, BOUNDARIES_UM, severity
+from chladni.spectral.levels import levels
+from chladni.spectral.severity import BOUNDARIES_MM_S, BOUNDARIES_UM, THIRD_OCTAVE, severity
 from tests.spectral.made_signals import blocks, series
 
 RATE_HZ = 5000.0
@@ -101,3 +103,23 @@ def test_what_is_no_motion_or_no_class_is_refused():
         severity(series(tone(50.0, 1.0), rate_hz=RATE_HZ, units=["N"]))
     with pytest.raises(SetupError, match="machine 'huge' is none of large-rigid"):
         severity(series(tone(50.0, 1.0), rate_hz=RATE_HZ), machine="huge")
+
+
+def test_velocity_and_displacement_are_of_one_transform(monkeypatch):
+    values = np.random.default_rng(5).standard_normal((2, 60_000))
+    whole = series(values, rate_hz=RATE_HZ)
+    alone = [
+        levels(whole, bands_hz=[(10 / THIRD_OCTAVE, 1000 * THIRD_OCTAVE)], integrations=often) for often in (1, 2)
+    ]
+    seen, rfft = [], scipy.fft.rfft
+
+    def counting(some, length):
+        seen.append(np.ndim(some))
+        return rfft(some, length)
+
+    monkeypatch.setattr(scipy.fft, "rfft", counting)
+    found = severity(iter(blocks(whole, [7000, 20_000, 33_000])))
+    # Those of samples have two axes, each beside two impulse responses.
+    assert seen.count(1) == 2 * seen.count(2) > 2
+    np.testing.assert_allclose(found.velocity_mm_s, 1e3 * alone[0].rms[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(found.displacement_um, 1e6 * alone[1].rms[:, 0], rtol=1e-9)

@@ -83,3 +83,16 @@ def test_a_window_of_a_long_record_is_laid_between_samples_of_a_shorter_one(monk
     found = zoom_spectrum(x, band_hz=(10.0, 20.0), lines=50)
     # A cosine by straight lines between 4096 points is (2 pi / 4096)^2 / 8 = 3e-7 off at most.
     np.testing.assert_allclose(found.values, expected.values, atol=1e-6 * expected.values.max())
+
+
+@pytest.mark.parametrize(("sizes", "readings"), [([4000], 1), ([2000, 2000], 2)])
+def test_a_lone_block_is_read_once(sizes, readings):
+    whole, reads = series(np.random.default_rng(4).standard_normal(4000)), []
+
+    def read():
+        reads.append(None)
+        return blocks(whole, sizes)
+
+    found = zoom_of_blocks(read, band_hz=(10.0, 20.0), lines=50)
+    assert len(reads) == readings
+    np.testing.assert_allclose(found.values, zoom_of_blocks(lambda: whole, band_hz=(10.0, 20.0), lines=50).values)
