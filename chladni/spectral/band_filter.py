@@ -191,10 +191,8 @@ class BandFilter:
         length = scipy.fft.next_fast_len(values.shape[1], real=not self.envelope)
         kept = slice(2 * self._reach, values.shape[1])
         if not self.envelope:
-            if self._transforms is None:
-                transformed = scipy.fft.rfft(values, length)
-            else:
-                transformed = self._transforms.of(values, length, run_ns=run_ns, place=self._taken)
+            shared = self._transforms or SharedTransforms()
+            transformed = shared.of(values, length, run_ns=run_ns, place=self._taken)
             spectrum = scipy.fft.rfft(self._response.real, length)
             return np.asarray(scipy.fft.irfft(transformed * spectrum, length)[:, kept])
         spectrum = scipy.fft.fft(self._response, length)
