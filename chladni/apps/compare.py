@@ -10,6 +10,7 @@ from chladni.apps.modes import identify_modes
 from chladni.apps.sources import Progress, Span, no_progress
 from chladni.apps.spectra import Averaging, densities, transfer
 from chladni.io.log import Log
+from chladni.io.log_info import some_of
 from chladni.modal.shapes.mode_comparison import compare_modes
 from chladni.modal.shapes.validation import validate
 from chladni.signals.comparison import DensityComparison, LevelChange, PeakChange, ResponseComparison
@@ -185,6 +186,15 @@ def _told(accounts: Sequence[tuple[Provenance, Provenance]]) -> tuple[str, ...]:
     )
 
 
+def _reaches(densities: Sequence[PowerSpectralDensity]) -> str:
+    """Name channels, and how far their spectra reach, which tells their rates apart."""
+    told = [
+        f"{some_of([channel.name for channel in one.channels])} up to {one.frequency_hz[-1]:.6g} Hz"
+        for one in densities
+    ]
+    return "; ".join(told)
+
+
 def _matched_densities(
     before: Log, after: Log, channels: Sequence[str] | None, resolution_hz: float | None
 ) -> list[tuple[PowerSpectralDensity, PowerSpectralDensity]]:
@@ -192,7 +202,8 @@ def _matched_densities(
     pairs = [(one, other) for one in old for other in new if _share_rate(one, other)]
     if not pairs:
         raise EstimateError(
-            f"{before.path.name} and {after.path.name} share no channel at the same sample rate; nothing to compare"
+            f"{before.path.name} and {after.path.name} share no channel at the same sample rate; nothing to compare. "
+            f"One has {_reaches(old)}, the other {_reaches(new)}"
         )
     return [_on_one_axis(before, after, one, other) for one, other in pairs]
 

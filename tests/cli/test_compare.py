@@ -40,6 +40,7 @@ def test_logs_without_a_common_channel_are_refused(run, arm_log, tmp_path):
     outcome = run("compare", arm_log, tmp_path / "other.mcap")
     assert outcome.code == 2
     assert "share no channel" in outcome.err
+    assert "; nothing to compare. One has " in outcome.err
 
 
 def test_figures_are_saved_where_asked_for(run, arm_log, louder_log, tmp_path):
