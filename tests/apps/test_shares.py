@@ -103,7 +103,7 @@ def agree(found: Any, expected: Any, scale: float = 0.0) -> None:
 
 
 @pytest.mark.parametrize("step", ASKED)
-@pytest.mark.parametrize("gaps", [False, True], ids=["whole", "gaps"])
+@pytest.mark.parametrize("gaps", [False, pytest.param(True, marks=pytest.mark.nightly)], ids=["whole", "gaps"])
 def test_sums_of_parts_are_those_of_the_whole(make: Make, step: str, gaps: bool) -> None:
     path = make(gaps=gaps, layout="batches")
     expected = whole(path, step)

@@ -264,8 +264,11 @@ def test_a_model_is_driven_by_a_data_file(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "command",
     [
-        *("info", "levels", "psd", "octaves", "envelope", "cepstrum", "frf", "modes", "srs"),
-        *("view", "compare", "gap", "convert"),
+        *("info", "psd", "frf", "view", "compare", "gap", "convert"),
+        *(
+            pytest.param(one, marks=pytest.mark.nightly)
+            for one in ("levels", "octaves", "envelope", "cepstrum", "modes", "srs")
+        ),
     ],
 )
 def test_a_rate_that_is_asked_for_can_be_given(run: Run, tmp_path: Path, command: str) -> None:

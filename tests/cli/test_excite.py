@@ -11,6 +11,7 @@ from tests.robots.made import URDF, written
 pytest.importorskip("mujoco")
 
 
+@pytest.mark.nightly
 def test_a_table_that_is_read_again_and_what_it_uses(run: Run, tmp_path: Path) -> None:
     robot, out = written(tmp_path, URDF, "arm.urdf"), tmp_path / "motion.csv"
     document = tmp_path / "motion.json"

@@ -231,6 +231,7 @@ def test_a_file_that_is_not_there_is_told(run: Run, engine: StandIn, files: tupl
     assert "absent.toml" in outcome.err
 
 
+@pytest.mark.nightly
 def test_pictures_are_written_where_they_were_asked_for(
     run: Run, engine: StandIn, files: tuple[Path, Path], tmp_path: Path
 ) -> None:

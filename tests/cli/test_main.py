@@ -108,6 +108,7 @@ def test_a_reader_that_goes_away_is_no_error(arm_log):
     assert "defect" not in finished.stderr
 
 
+@pytest.mark.nightly
 def test_files_are_written_for_a_reader_that_goes_away(arm_log, tmp_path):
     # The summary ends what `head` wants; the document comes last.
     document = tmp_path / "psd.json"

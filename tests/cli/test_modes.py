@@ -72,7 +72,14 @@ def test_band_count_and_frequency_choose(run, arm_log, truth):
     assert frequencies("--frequency", 170) == pytest.approx(truth.frequency_hz[-1:], rel=0.01)
 
 
-@pytest.mark.parametrize("method", ["circle-fit", "half-power", "fdd", "efdd", "ssi-cov"])
+@pytest.mark.parametrize(
+    "method",
+    [
+        "half-power",
+        "fdd",
+        *(pytest.param(one, marks=pytest.mark.nightly) for one in ("circle-fit", "efdd", "ssi-cov")),
+    ],
+)
 def test_other_methods(run, arm_log, truth, method):
     document = run("modes", arm_log, "--method", method, "--band", 5, 280, "--json", "-").document
     found = np.array([mode["frequency_hz"] for mode in document["modes"]])

@@ -192,6 +192,7 @@ def test_what_is_not_there_has_no_page(tmp_path: Path) -> None:
     assert contents.view_names() == ["Answer"]
 
 
+@pytest.mark.nightly
 @pytest.mark.viewer
 @pytest.mark.skipif(not HAS_VULKAN, reason="no Vulkan driver; on Debian: apt install mesa-vulkan-drivers")
 def test_no_view_of_any_page_complains(file: Path) -> None:

@@ -72,6 +72,7 @@ def hardening_of_one() -> Study:
     return studied(log_of(HARDENING, outputs=[2]))
 
 
+@pytest.mark.nightly
 def test_a_diagnosis_asks_for_what_tells_its_candidates_apart() -> None:
     # Both scale the only channel.
     found = diagnose(three_bodies(), [log_of(gain("hammer"), outputs=[2])], leave_out=ONLY_GAINS)

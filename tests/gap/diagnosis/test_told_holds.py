@@ -114,7 +114,7 @@ def test_twenty_machines_of_each_kind(hold, kind, noise):
         pytest.param(("hardening_stiffness", "j1", {"cubic": 3e12}), marks=pytest.mark.nightly),
         pytest.param(("coulomb_friction", "j1", {"force": 20.0}), marks=pytest.mark.nightly),
         # Not by half a sample, which another hold does as well.
-        ("delay", "hammer", {"delay": 3.0 / RATE_HZ}),
+        pytest.param(("delay", "hammer", {"delay": 3.0 / RATE_HZ}), marks=pytest.mark.nightly),
     ],
     ids=lambda effect: effect[0],
 )

@@ -80,7 +80,7 @@ def test_bombs_are_refused_before_memory_is_taken(tmp_path: Path, bomb: str) -> 
     assert peak + pa.total_allocated_bytes() - before < ZEROS // 8
 
 
-@pytest.mark.parametrize("bomb", ["npz", "mat"])
+@pytest.mark.parametrize("bomb", ["npz", pytest.param("mat", marks=pytest.mark.nightly)])
 def test_the_advice_works(tmp_path: Path, bomb: str) -> None:
     suffix, write = BOMBS[bomb]
     write(tmp_path / f"a{suffix}")

@@ -100,6 +100,7 @@ def test_sharp_laws_agree_over_ten_cycles(name):
     assert relative_rms(found.states, by_radau(compiled, signal)) <= 1e-4
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", named(SMOOTH))
 def test_smooth_laws_agree_over_ten_cycles(name):
     compiled, amplitude = SMOOTH[name]

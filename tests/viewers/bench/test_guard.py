@@ -168,6 +168,7 @@ def test_there_are_no_more_pages_than_there_may_be(server: Any, port: int, monke
     until(lambda: server.open_pages == 1)
 
 
+@pytest.mark.nightly
 def test_pages_that_no_browser_joins_are_few_and_soon_gone(
     server: Any, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -344,7 +345,14 @@ def test_bodies_and_long_headers_are_refused(
     assert server.open_pages == 0
 
 
-@pytest.mark.parametrize("sent", [b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: "])
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"",
+        pytest.param(b"GET / HT", marks=pytest.mark.nightly),
+        pytest.param(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: ", marks=pytest.mark.nightly),
+    ],
+)
 def test_slow_clients_keep_nobody_out_and_are_let_go(port: int, sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chladni.viewers.bench.server.MOST_CONNECTIONS", 5)
     with ExitStack() as kept:

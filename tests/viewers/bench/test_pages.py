@@ -122,6 +122,7 @@ def test_arrow_keys_turn_a_knob_and_the_curves_follow(page: Any) -> None:
     assert page.locator("input[type=text]").first.input_value() == "2.02"
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_tab_reaches_knobs_entries_and_buttons(page: Any) -> None:
     reached = set()
@@ -156,6 +157,7 @@ def test_an_impossible_value_is_refused_and_the_curves_stay(page: Any) -> None:
     page.locator(".m.error").wait_for(state="detached")
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_a_setting_that_has_no_reading_keeps_the_last_good_one(page: Any) -> None:
     before = curves(page)
@@ -167,6 +169,7 @@ def test_a_setting_that_has_no_reading_keeps_the_last_good_one(page: Any) -> Non
     assert page.locator("select").first.input_value() == "none"
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_the_last_of_thirty_keys_wins_and_few_readings_are_taken(page: Any) -> None:
     READ.seconds = 0.15
@@ -190,6 +193,7 @@ def test_readings_are_taken_off_the_pages_thread(page: Any) -> None:
     assert all(name.startswith("chladni-bench") for name in READ.threads)
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_one_setting_comes_as_one_patch(page: Any) -> None:
     frames: list[Any] = []
@@ -226,6 +230,7 @@ def test_kept_variants_stay_as_faded_curves_with_a_chip(page: Any) -> None:
     assert until_drawn(page, drawn) == drawn
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_influence_is_computed_when_one_looks(page: Any) -> None:
     page.get_by_role("button", name=VIEWS[1], exact=True).click()
@@ -275,6 +280,7 @@ def test_reset_goes_back(page: Any) -> None:
     assert until_back(page, before)
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_the_page_fits_a_window_of_1280_by_800(page: Any) -> None:
     last = page.locator("canvas:visible").last.bounding_box()

@@ -114,6 +114,7 @@ def test_colours_follow_the_scheme_of_the_screen(browser: Any, spectra: str, tmp
     page.close()
 
 
+@pytest.mark.nightly
 def test_hostile_names_are_drawn_and_neither_run_nor_fetch(browser: Any, tmp_path: Path) -> None:
     alarms: list[str] = []
     study = replace(synthetic.hostile_study(), response=None)
