@@ -5,7 +5,6 @@ from dataclasses import replace
 from math import inf
 
 from chladni.gap.records.diagnosis import Cause, Diagnosis, DistortionShare, FittedNumber, Ranked, Where
-from chladni.gap.records.robot import site_words
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.viewers.effect_words import NOT_DETERMINED, cause_heading, effect_heading, printed_number
 from chladni.viewers.engineering import SURE, chance, engineering, percent, signed_percent, span
@@ -143,8 +142,8 @@ def ranking_table(found: Diagnosis, *, count: int = RANKED) -> Table:
 
 def _place(one: Ranked) -> str:
     """Site, and what else the row's numbers are of."""
-    others = ", ".join(f"{effect_heading(each.effect)} at {site_words(each.site)}" for each in one.beside)
-    return site_words(one.site) + (f" (with {others})" if others else "")
+    others = ", ".join(f"{effect_heading(each.effect)} at {each.site}" for each in one.beside)
+    return f"{one.site} (with {others})" if others else one.site
 
 
 def _standing(one: Ranked) -> tuple[float, float]:
@@ -167,7 +166,7 @@ def parameter_table(found: Diagnosis) -> Table:
 def cause_table(found: Diagnosis) -> Table:
     """Every parameter of every cause, with the form of its law."""
     rows = [
-        (cause_heading(cause), site_words(cause.site), name.replace("_", " "), _value(cause, name, number))
+        (cause_heading(cause), cause.site, name.replace("_", " "), _value(cause, name, number))
         for cause in found.causes
         for name, number in cause.parameters.items()
     ]

@@ -10,7 +10,7 @@ Over = Literal["velocity", "position"]
 
 
 def site_words(site: str) -> str:
-    """Say a site: two joints whose gears run in one another by what both are called.
+    """Say a site in a sentence, a pair by both of its names; tables show it as documents have it.
 
     Examples
     --------
