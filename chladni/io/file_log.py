@@ -15,6 +15,7 @@ from chladni.io.log import Log, outside
 from chladni.io.log_info import LogInfo, some_of, unread_sentences
 from chladni.io.log_survey import survey_file
 from chladni.io.loss import Loss, Unread
+from chladni.io.missing_samples import MissingSamples
 from chladni.io.setup import ChannelSetup, Setup, refined
 from chladni.io.shared_grid import SampleGrid
 from chladni.io.stamps import StampRequest
@@ -52,6 +53,7 @@ class FileLog(Log):
         self._contents = contents
         self._geometry = _joined(contents.geometry, geometry)
         self._info: LogInfo | None = None
+        self._missing = MissingSamples()
 
     @property
     def path(self) -> Path:
@@ -85,7 +87,11 @@ class FileLog(Log):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what was inferred from the file."""
+        """Sentences on what was inferred from the file, and on samples that are missing in what was read."""
+        return (*self._inferred, *self._missing.sentences(from_ns=self.start_time_ns))
+
+    @property
+    def _inferred(self) -> tuple[str, ...]:
         told = [note.removeprefix(f"{self._path}: ") for note in self._contents.notes]
         suffix = self._path.suffix.lower()
         if suffix != self._kind:
@@ -125,7 +131,7 @@ class FileLog(Log):
             told = f"between {start_s or 0.0} s and {'its end' if end_s is None else f'{end_s} s'}"
             told += outside(start_s, end_s, self._last_s(groups))
             raise LogError(f"{self._path.name}: {some_of(missing) + ' has ' if missing else ''}no sample {told}")
-        return tuple(found)
+        return tuple(self._missing.watch(found))
 
     def _last_s(self, groups: Sequence[TimeSeries]) -> float | None:
         ends_ns = [one.start_time_ns + round((one.samples - 1) / one.sample_rate_hz * NS_PER_S) for one in groups]
@@ -176,7 +182,7 @@ class FileLog(Log):
         """Look at all samples once and tell whether the file is sound."""
         if self._info is None:
             kind = self._kind.removeprefix(".")
-            self._info = survey_file(self._path.name, kind, self._contents, notes=self.notes, unread=self.unread)
+            self._info = survey_file(self._path.name, kind, self._contents, notes=self._inferred, unread=self.unread)
         return self._info
 
     def close(self) -> None:

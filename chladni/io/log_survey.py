@@ -131,9 +131,10 @@ def survey_file(
         offset_s = (part.start_time_ns - begin_ns) / NS_PER_S
         lost = _judged(part, faults, offset_s)
         channels += _file_channels(part, base, kind, lost, faults, offset_s)
+        beyond = _beyond_gaps(part, base or _stated_rate(part)).tolist()
         missing += [
             (channel.name, missing_sentence(count, part.samples))
-            for channel, count in zip(part.channels, _beyond_gaps(part).tolist(), strict=True)
+            for channel, count in zip(part.channels, beyond, strict=True)
             if count
         ]
     told = (
@@ -197,11 +198,17 @@ def _file_channels(
     ]
 
 
-def _beyond_gaps(series: TimeSeries) -> Whole:
-    """Samples of each channel that are missing where another channel has one."""
+def _beyond_gaps(series: TimeSeries, clock: TimeBase) -> Whole:
+    """Samples of each channel that are missing, besides those in the gaps that the clock has."""
     if series.valid is None:
         return np.zeros(len(series.channels), np.int64)
-    beyond: Whole = np.count_nonzero(~series.valid & series.valid.any(axis=0), axis=1)
+    expected = np.ones(series.samples, np.bool_)
+    for start_s, end_s in clock.gaps:
+        first, last = (round(one * series.sample_rate_hz) for one in (start_s, end_s))
+        expected[first + 1 : last] = False
+    # Where any channel has a sample there is no gap, whatever the clock makes of the times.
+    expected |= series.valid.any(axis=0)
+    beyond: Whole = np.count_nonzero(~series.valid & expected, axis=1)
     return beyond
 
 

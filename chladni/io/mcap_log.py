@@ -22,6 +22,7 @@ from chladni.io.log_survey import survey
 from chladni.io.loss import Loss, Unread, losses
 from chladni.io.mcap.container import McapContainer
 from chladni.io.mcap.limits import Limits
+from chladni.io.missing_samples import MissingSamples
 from chladni.io.number_lists import NumberLists
 from chladni.io.setup import Setup
 from chladni.io.shared_grid import SampleGrid
@@ -83,6 +84,7 @@ class McapLog(Log):
         self._close = finalize(self, container.close)
         self._known: tuple[object, FirstPass] | None = None
         self._info: LogInfo | None = None
+        self._missing = MissingSamples()
 
     @property
     def path(self) -> Path:
@@ -116,8 +118,8 @@ class McapLog(Log):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is odd about messages that have been read so far, in sentences."""
-        return oddities(self._lost)
+        """What is odd about messages that have been read so far, and which samples are missing, in sentences."""
+        return (*oddities(self._lost), *self._missing.sentences(from_ns=self.start_time_ns))
 
     @property
     def unread(self) -> tuple[Unread, ...]:
@@ -144,7 +146,7 @@ class McapLog(Log):
         one_clock: bool = False,
     ) -> tuple[TimeSeries, ...]:
         """Read channels, one series for each sampling grid; see `Log.read_groups`."""
-        return self._reader(paths, start_s, end_s).series(one_clock=one_clock)
+        return tuple(self._missing.watch(self._reader(paths, start_s, end_s).series(one_clock=one_clock)))
 
     def stamped(
         self, paths: Sequence[str], *, start_s: float | None = None, end_s: float | None = None
@@ -169,7 +171,7 @@ class McapLog(Log):
         if not (isfinite(seconds) and seconds > 0):
             raise LogError(f"blocks of {seconds} s: seconds must be finite and positive")
         reader = self._reader(paths, start_s, end_s)
-        return self._held_open(reader.blocks(self._first_pass(reader), seconds, between))
+        return self._held_open(self._missing.watch(reader.blocks(self._first_pass(reader), seconds, between)))
 
     def grids(
         self, paths: Sequence[str] | None = None, *, start_s: float | None = None, end_s: float | None = None

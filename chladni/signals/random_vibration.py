@@ -128,6 +128,8 @@ class ProbabilityDensity(Value):
         ``[channel]``, in each channel's unit.
     channels
         One for each row.
+    notes
+        What wasn't counted, in sentences.
     """
 
     AXES: ClassVar = {"density": ("channels", "deviation"), "std": ("channels", "deviation")}
@@ -139,6 +141,7 @@ class ProbabilityDensity(Value):
     mean: Real
     standard_deviation: Real
     channels: tuple[Channel, ...]
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         expected = (len(self.channels), self.deviation.size)

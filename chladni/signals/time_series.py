@@ -126,8 +126,8 @@ class TimeSeries(Value):
         Parameters
         ----------
         values
-            ``[channel, sample]``, ``[sample]`` of one channel, or the samples of each channel by its name. NaN is a
-            sample that is missing, and is marked so.
+            ``[channel, sample]``, ``[sample]`` of one channel, or the samples of each channel by its name. NaN, or
+            what is infinite, is a sample that is missing, and is marked so.
         sample_rate_hz
             Samples a second.
         names
@@ -159,7 +159,7 @@ class TimeSeries(Value):
         # Not multiplied by one: a gigabyte is viewed, not copied.
         if any(factor != 1 for factor in factors):
             table = table * np.array(factors)[:, np.newaxis]
-        missing = np.isnan(table)
+        missing = ~np.isfinite(table)
         return cls(
             values=table,
             sample_rate_hz=sample_rate_hz,

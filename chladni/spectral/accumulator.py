@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Generic, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.log_info import some_of
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel, find_channel
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
@@ -360,8 +361,8 @@ class SpectraAccumulator(Generic[SpectraT]):
         samples, longest = self.segmentation.samples, self.stretch.longest_run
         where = f"valid in all of {len(self.channels)} channels" if len(self.channels) > 1 else "valid"
         remedy = "leave out the channels that have gaps"
-        if not longest and len(self.channels) == 1:
-            return "no sample is a number (all are NaN); leave the channel out"
+        if empty := self.stretch.never_measured(self.channels):
+            return f"{some_of(empty)}: not one sample is a number; leave {'it' if len(empty) == 1 else 'them'} out"
         if longest >= SHORTEST_SEGMENT:
             remedy = f"ask for {rounded_up(self.sample_rate_hz / longest)} Hz or coarser, or {remedy}"
         return (

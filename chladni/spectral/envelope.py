@@ -6,6 +6,7 @@ from math import frexp, ldexp, nan, sqrt
 
 import numpy as np
 
+from chladni.io.missing_samples import MissingSamples
 from chladni.io.source import Blocks, SeriesLike, blocks_of, extent_of, log_or_series
 from chladni.signals.channel import Channel, Names
 from chladni.signals.envelope import Bearing, EnvelopeSpectrum, FaultLine, Kurtogram
@@ -102,7 +103,12 @@ def envelope(
     named = BandChoice(band_hz=band_hz or (0.0, 0.0))
     choices = dict.fromkeys(names, named) if band_hz else chosen_bands(samples(), faults_hz)
     _, length_s = extent_of(whole, channels=channels, start_s=start_s, end_s=end_s)
-    return envelope_spectra(samples(), choices, length_s=length_s, resolution_hz=resolution_hz, faults_hz=faults_hz)
+    missing = MissingSamples()
+    spectra = envelope_spectra(
+        missing.watch(samples()), choices, length_s=length_s, resolution_hz=resolution_hz, faults_hz=faults_hz
+    )
+    notes = missing.sentences(from_ns=lead[0].start_time_ns)
+    return tuple(replace(one, notes=(*one.notes, *notes)) for one in spectra)
 
 
 def envelope_spectra(

@@ -1,11 +1,13 @@
 """Levels of a series or a stream of blocks: RMS, peak, crest factor, skewness and kurtosis, over all and running."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.missing_samples import MissingSamples
 from chladni.io.source import Blocks, SeriesLike, blocks_of
 from chladni.signals.arrays import Index, Mask, Real, Whole
 from chladni.signals.channel import Channel, Names
@@ -91,13 +93,15 @@ def levels(
     [3.0, 1.414214, 2.0, 1.5]
     """
     source = blocks_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
-    lead, blocks = leading_part(source, 1)
+    missing = MissingSamples()
+    lead, blocks = leading_part(missing.watch(source), 1)
     first = lead[0]
     accumulator = LevelsAccumulator(
         first.channels, first.sample_rate_hz, bands_hz=bands_hz, running_s=running_s, integrations=integrations
     )
     sum_up(blocks, accumulator)
-    return accumulator.result()
+    found = accumulator.result()
+    return replace(found, notes=(*found.notes, *missing.sentences(from_ns=first.start_time_ns)))
 
 
 class LevelsAccumulator:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chladni.io.missing_samples import missing_notes
 from chladni.io.source import SeriesLike, density_of, series_of
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Names
@@ -184,6 +185,7 @@ def probability_density(
         mean=np.array([mean for _, _, mean, _ in rows]),
         standard_deviation=np.array([size for _, _, _, size in rows]),
         channels=series.channels,
+        notes=missing_notes(series),
     )
 
 

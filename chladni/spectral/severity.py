@@ -6,6 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from chladni.io.missing_samples import MissingSamples
 from chladni.io.source import Blocks, SeriesLike, blocks_of
 from chladni.signals.channel import Channel, Names
 from chladni.signals.errors import EstimateError, SetupError
@@ -98,10 +99,12 @@ def severity(
     (44.3, 283.0, ('D',))
     """
     source = blocks_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
-    lead, blocks = leading_part(source, 1)
+    missing = MissingSamples()
+    lead, blocks = leading_part(missing.watch(source), 1)
     accumulator = SeverityAccumulator(lead[0].channels, lead[0].sample_rate_hz, machine=machine, slow=slow)
     sum_up(blocks, accumulator)
-    return accumulator.result()
+    found = accumulator.result()
+    return replace(found, notes=(*found.notes, *missing.sentences(from_ns=lead[0].start_time_ns)))
 
 
 class SeverityAccumulator:

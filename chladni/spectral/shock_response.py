@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 
+from chladni.io.missing_samples import MissingSamples
 from chladni.io.source import Blocks, SeriesLike, blocks_of, extent_of, is_blocks, log_or_series
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel, Names
@@ -110,7 +111,8 @@ def srs(
     blocks, longest = _opened(
         source, quantity, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s
     )
-    lead, parts = leading_part(blocks, 1)
+    missing = MissingSamples()
+    lead, parts = leading_part(missing.watch(blocks), 1)
     first = lead[0]
     lines_hz = _lines(first.sample_rate_hz, longest, band_hz, lines_an_octave, frequencies_hz)
     offsets = _medians(blocks) if offset == "median" else np.zeros(len(first.channels)) if offset == "keep" else None
@@ -119,7 +121,8 @@ def srs(
     )
     for one in parts:
         accumulator.update(one)
-    return accumulator.result()
+    found = accumulator.result()
+    return replace(found, notes=(*missing.sentences(from_ns=first.start_time_ns), *found.notes))
 
 
 class ShockAccumulator:

@@ -7,6 +7,8 @@ from typing import Self
 
 import numpy as np
 
+from chladni.signals.arrays import Mask
+from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.spectral.segmentation import SHORTEST_SEGMENT, Segmentation
@@ -88,6 +90,7 @@ class Stretch:
         self.start_ns: int | None = None
         self.end_ns: int | None = None
         self.longest_run = 0
+        self._measured: set[str] = set()
         self._samples = 0
         self._run = 0
         self._segments_of_runs = 0
@@ -98,6 +101,10 @@ class Stretch:
         """Segments left out so far because samples in them are invalid."""
         possible = self.segmentation.count(self._samples)
         return self._skipped_before + possible - self._segments_of_runs - self.segmentation.count(self._run)
+
+    def never_measured(self, channels: Sequence[Channel]) -> list[str]:
+        """Names of those of these channels that had no valid sample yet."""
+        return [channel.name for channel in channels if channel.name not in self._measured]
 
     def breaks_at(self, start_ns: int, sample_rate_hz: float) -> bool:
         """Whether a block that starts then doesn't continue the last one; half a sample is forgiven.
@@ -124,6 +131,8 @@ class Stretch:
             # What wasn't recorded isn't skipped: only segments within a stretch are counted.
             self._skipped_before = self.skipped
             self._samples = self._run = self._segments_of_runs = 0
+        there: Mask | None = None if block.valid is None else np.logical_or.reduce(block.valid, axis=1)
+        self._measured.update(one.name for row, one in enumerate(block.channels) if there is None or there[row])
         self.extend_by(block.samples, runs)
         self.start_ns = block.start_time_ns if self.start_ns is None else self.start_ns
         # From this block's own start, so that rounding doesn't add up over blocks.

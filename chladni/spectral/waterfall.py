@@ -1,11 +1,13 @@
 """Spectra over time: the waterfall."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chladni.io.missing_samples import MissingSamples
 from chladni.io.source import Blocks, SeriesLike, blocks_of
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel, Names
@@ -88,13 +90,16 @@ def waterfall(
     if max_slices < 2:
         raise EstimateError(f"max_slices is {max_slices}; a waterfall needs at least 2")
     source = blocks_of(source, channels=channels, sample_rate_hz=sample_rate_hz, start_s=start_s, end_s=end_s)
-    lead, blocks = leading_part(source, SAMPLES_TO_CHOOSE_FROM)
+    missing = MissingSamples()
+    lead, blocks = leading_part(missing.watch(source), SAMPLES_TO_CHOOSE_FROM)
     known = samples_known(source, lead, SAMPLES_TO_CHOOSE_FROM)
     plan = _plan(lead[0].sample_rate_hz, known, resolution_hz, window=window, overlap=overlap, detrend=detrend)
     accumulator = WaterfallAccumulator(lead[0].channels, lead[0].sample_rate_hz, plan, max_slices=max_slices)
     for block in blocks:
         accumulator.update(block)
-    return accumulator.result()
+    found = accumulator.result()
+    notes = missing.sentences(from_ns=lead[0].start_time_ns)
+    return replace(found, provenance=found.provenance.with_notes(*notes))
 
 
 class WaterfallAccumulator:

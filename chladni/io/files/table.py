@@ -18,6 +18,8 @@ from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.wording import counted
 
+MOST_TOLD = 5
+
 # A rate that is given and one that the times tell are the same when they're this near; clocks are far truer.
 _SAME_RATE = 0.01
 
@@ -162,7 +164,9 @@ def series_of_rows_at(
     signals, left_out = _signals(columns, {name for name, _ in unread} | set(times.columns if times else ()))
     unread += left_out
     if not signals:
-        raise LogError(f"{where}: holds a time column and nothing else" if times else f"{where}: holds no numbers")
+        held = "no numbers besides a time column" if times else "no numbers"
+        others = "; ".join(f"{name}: {reason}" for name, reason in unread[:MOST_TOLD])
+        raise LogError(f"{where}: holds {held}; {others or 'record at least one channel'}")
     channels, notes = channels_of(signals, units, where=where)
     rows = [column.numbers for column in signals if column.numbers is not None]
     if times is None:
