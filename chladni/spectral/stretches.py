@@ -7,7 +7,6 @@ from typing import Self
 
 import numpy as np
 
-from chladni.signals.arrays import Mask
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import NS_PER_S, TimeSeries
@@ -131,7 +130,7 @@ class Stretch:
             # What wasn't recorded isn't skipped: only segments within a stretch are counted.
             self._skipped_before = self.skipped
             self._samples = self._run = self._segments_of_runs = 0
-        there: Mask | None = None if block.valid is None else np.logical_or.reduce(block.valid, axis=1)
+        there = None if block.valid is None else np.asarray(block.valid.any(axis=1))
         self._measured.update(one.name for row, one in enumerate(block.channels) if there is None or there[row])
         self.extend_by(block.samples, runs)
         self.start_ns = block.start_time_ns if self.start_ns is None else self.start_ns
