@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chladni.io.files.contents import FileContents, on_common_grids
-from chladni.io.files.formats import read_file
+from chladni.io.files.formats import read_file, told_by_content
 from chladni.io.known_schemas import likely_role
 from chladni.io.log import Log, outside
 from chladni.io.log_info import LogInfo, some_of, unread_sentences
@@ -93,10 +93,7 @@ class FileLog(Log):
     @property
     def _inferred(self) -> tuple[str, ...]:
         told = [note.removeprefix(f"{self._path}: ") for note in self._contents.notes]
-        suffix = self._path.suffix.lower()
-        if suffix != self._kind:
-            told.insert(0, f"read as a {self._kind} file by its content; its suffix is {suffix!r}.")
-        return tuple(told)
+        return (*told_by_content(self._path, self._kind), *told)
 
     @property
     def unread(self) -> tuple[Unread, ...]:

@@ -9,6 +9,7 @@ from chladni.io.catalog import Catalog
 from chladni.io.clock.shared_clocks import clocks_of
 from chladni.io.clock.time_base import TimeBase
 from chladni.io.files.contents import FileContents
+from chladni.io.files.formats import MCAP, told_by_content
 from chladni.io.gathering import Gathering, LostMessages, place_all, windowed
 from chladni.io.log_findings import fault_findings, log_findings, missing_sentence, together, unit_findings
 from chladni.io.log_info import ChannelInfo, LogInfo, oddities, unread_sentences
@@ -42,13 +43,14 @@ def survey(
     lost.merge(pass_lost)
     found = dict(_channels(content, monitors, placements))
     damage = losses(container.damage, lost)
+    odd = (*told_by_content(container.path, MCAP), *oddities(lost))
     return LogInfo(
         file=content.file,
         start_time_ns=content.start_ns,
         duration_s=_duration_s(content, placements) or _logged_s(container),
         channels=tuple(found[source.channel.name] for source in content.channels),
         damage=damage,
-        findings=tuple(log_findings(content, monitors, placements, damage, oddities(lost))),
+        findings=tuple(log_findings(content, monitors, placements, damage, odd)),
         unread=content.unread,
     )
 

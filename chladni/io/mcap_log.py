@@ -13,6 +13,7 @@ import numpy as np
 from chladni.io.catalog import Catalog, read_catalog
 from chladni.io.channel_source import ChannelSource
 from chladni.io.clock.shared_clocks import Key, StreamClock, clocks_of
+from chladni.io.files.formats import MCAP, told_by_content
 from chladni.io.first_pass import FirstPass
 from chladni.io.gathering import LostMessages, gather
 from chladni.io.log import Log, outside
@@ -119,7 +120,8 @@ class McapLog(Log):
     @property
     def notes(self) -> tuple[str, ...]:
         """What is odd about messages that have been read so far, and which samples are missing, in sentences."""
-        return (*oddities(self._lost), *self._missing.sentences(from_ns=self.start_time_ns))
+        told = told_by_content(self.path, MCAP)
+        return (*told, *oddities(self._lost), *self._missing.sentences(from_ns=self.start_time_ns))
 
     @property
     def unread(self) -> tuple[Unread, ...]:

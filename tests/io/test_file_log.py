@@ -178,6 +178,9 @@ def test_an_mcap_log_is_one_under_any_name(tmp_path: Path, name: str) -> None:
     with chladni.open(tmp_path / name) as log:
         assert isinstance(log, McapLog)
         np.testing.assert_array_equal(log.read().values, truth())
+        told = [note for note in log.notes if "by its content" in note]
+    suffix = Path(name).suffix
+    assert told == ([f"read as a .mcap file by its content; its suffix is {suffix!r}."] if suffix else [])
 
 
 @pytest.mark.parametrize(
@@ -186,14 +189,18 @@ def test_an_mcap_log_is_one_under_any_name(tmp_path: Path, name: str) -> None:
         (b"", "the file is empty"),
         (b"#ROSBAG V2.0\n" + bytes(50), "a ROS 1 bag"),
         (b"\x1f\x8b" + bytes(50), "compressed with gzip"),
+        (b"PK\x03\x04" + bytes(50), "save the other as CSV"),
+        (b"\xd0\xcf\x11\xe0" + bytes(50), "save it as CSV"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(50), "an HDF5 file"),
         (b"nothing to see\nin these lines\n", "not an MCAP log"),
         (bytes(range(256)) * 4, "not an MCAP log"),
     ],
 )
 def test_what_is_no_kind_that_is_read_is_refused(tmp_path: Path, content: bytes, words: str) -> None:
-    (tmp_path / "a.dat").write_bytes(content)
-    with pytest.raises(LogError, match=words):
-        chladni.open(tmp_path / "a.dat")
+    for name in ("a.dat", "a.csv") if content.startswith(b"P") else ("a.dat",):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(LogError, match=words):
+            chladni.open(tmp_path / name)
     with pytest.raises(LogError, match="No such file"):
         chladni.open(tmp_path / "none.dat")
 

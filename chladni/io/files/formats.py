@@ -23,6 +23,7 @@ from types import NoneType
 from typing import Any, Final, TypeVar, get_args
 
 from chladni.io.files.contents import FileContents
+from chladni.io.mcap.log_file import looks_like
 from chladni.io.regular_file import require_regular
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.wording import shown
@@ -80,7 +81,7 @@ def file_kind(path: Path) -> str:
     """Tell the kind of a file: `MCAP`, or the suffix of the data files that it is one of.
 
     The first bytes decide where they tell; else the suffix, where it is that of a data file; else a text with lines
-    of numbers is a table. All other files count as MCAP, whose reader says what they look like.
+    of numbers is a table. All other files count as MCAP, whose reader says what they look like: an archive by any name.
     """
     suffix = path.suffix.lower()
     try:
@@ -93,9 +94,20 @@ def file_kind(path: Path) -> str:
             # Several suffixes stand for one kind.
             known = kind == MCAP or kind in FILE_SUFFIXES
             return suffix if known and _same_kind(suffix, kind) else kind if known else suffix
+    # A zip archive may be an NPZ that holds something else first.
+    if looks_like(start) and suffix != ".npz":
+        return MCAP
     if suffix not in _TEXTS and _TEXT.fullmatch(start) and _is_table(path):
         return ".txt"
     return suffix if suffix in FILE_SUFFIXES else MCAP
+
+
+def told_by_content(path: Path, kind: str) -> tuple[str, ...]:
+    """Say that a file was read as another kind than its suffix stands for; nothing where the two agree."""
+    suffix = path.suffix.lower()
+    if suffix == kind or (kind == MCAP and not suffix):
+        return ()
+    return (f"read as a {kind} file by its content; its suffix is {suffix!r}.",)
 
 
 def _first_bytes(path: Path) -> bytes:

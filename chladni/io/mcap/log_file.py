@@ -16,10 +16,15 @@ _WINDOW_BYTES = 4 * 1024
 _OTHER_FORMATS = (
     (b"#ROSBAG", "a ROS 1 bag; convert it with 'mcap convert in.bag out.mcap'"),
     (b"SQLite format 3\0", "a ROS 2 .db3 bag; convert it with 'mcap convert in.db3 out.mcap'"),
-    (b"\x1f\x8b", "compressed with gzip; unpack it with gunzip first"),
-    (b"\x28\xb5\x2f\xfd", "compressed with zstd; unpack it with 'zstd -d' first"),
-    (b"\x04\x22\x4d\x18", "compressed with lz4; unpack it with 'lz4 -d' first"),
-    (b"PK\x03\x04", "a zip archive; unpack it first"),
+    (b"\x1f\x8b", "a file compressed with gzip; unpack it with gunzip first"),
+    (b"\x28\xb5\x2f\xfd", "a file compressed with zstd; unpack it with 'zstd -d' first"),
+    (b"\x04\x22\x4d\x18", "a file compressed with lz4; unpack it with 'lz4 -d' first"),
+    (b"BZh", "a file compressed with bzip2; unpack it with bunzip2 first"),
+    (b"\xfd7zXZ", "a file compressed with xz; unpack it with unxz first"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive; unpack it first"),
+    (b"PK\x03\x04", "a zip archive, or an Excel workbook; unpack the one, save the other as CSV"),
+    (b"\xd0\xcf\x11\xe0", "an old Excel workbook; save it as CSV"),
+    (b"\x89HDF", "an HDF5 file; save its arrays as .npz or .parquet, with their times or their rate"),
     (b"\x89MCAP", "another version of MCAP, of which only version 0 is known"),
 )
 # What programs that take a file for text make of the magic; it holds a high bit and both line ends to show this.
@@ -35,6 +40,11 @@ _TEXT_MODE = (
 _SEARCHED_BYTES = 1 << 20
 #: Line feeds that all follow a carriage return, the two in the magics among them: 1 in 65 536 by chance.
 _FEWEST_LINE_FEEDS = 4
+
+
+def looks_like(start: bytes) -> str:
+    """Say what people open by mistake that begins with these bytes, and what helps; nothing where none does."""
+    return next((hint for magic, hint in _OTHER_FORMATS if start.startswith(magic)), "")
 
 
 class LogFile:
@@ -77,10 +87,11 @@ class LogFile:
         for magic, change in _TEXT_MODE:
             if start.startswith(magic):
                 raise self._text_mode_error(f"{change} in its first bytes")
-        looks_like = [f"; it looks like {hint}" for magic, hint in _OTHER_FORMATS if start.startswith(magic)]
+        if hint := looks_like(start):
+            raise LogError(f"{self.path}: not a log as it is; it looks like {hint}")
         raise LogError(
             f"{self.path}: not an MCAP log: starts with {start[:8].hex(' ')}, expected the MCAP magic "
-            f"{MAGIC.hex(' ')}{''.join(looks_like)}"
+            f"{MAGIC.hex(' ')}"
         )
 
     def require_lone_line_feeds(self) -> None:

@@ -33,10 +33,7 @@ def test_what_the_file_looks_like_is_said(tmp_path: Path, content: bytes, hint: 
     with pytest.raises(LogError) as told:
         McapContainer.open(path)
     message = str(told.value)
-    assert message.startswith(
-        f"{path}: not an MCAP log: starts with {content[:8].hex(' ')}, expected the MCAP magic 89 4d"
-    )
-    assert "it looks like " in message
+    assert message.startswith(f"{path}: not a log as it is; it looks like ")
     assert hint in message
     assert "\n" not in message
 
