@@ -81,7 +81,7 @@ def file_kind(path: Path) -> str:
     """Tell the kind of a file: `MCAP`, or the suffix of the data files that it is one of.
 
     The first bytes decide where they tell; else the suffix, where it is that of a data file; else a text with lines
-    of numbers is a table. All other files count as MCAP, whose reader says what they look like: an archive by any name.
+    of numbers is a table. All other files count as MCAP, whose reader says what they look like: so an archive.
     """
     suffix = path.suffix.lower()
     try:
