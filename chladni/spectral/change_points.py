@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import f as f_law
+from scipy.special import fdtrc
 
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
@@ -182,7 +182,7 @@ class _Problem:
         share = self._independent_share(sorted([*places, *more]))
         statistic = gain / len(more) * share / (power / freedom)
         tried = comb(int(self.allowed(places).sum()), len(more))
-        return bool(f_law.sf(statistic, len(more), max(freedom * share, 1.0)) * tried < false_alarm / 2)
+        return bool(fdtrc(len(more), max(freedom * share, 1.0), statistic) * tried < false_alarm / 2)
 
     def _independent_share(self, places: list[int]) -> float:
         """Share of the values that count, by what further steps would leave, sure or not.

@@ -1,6 +1,7 @@
 """Workers of Dask distributed: of this machine for one run, or of a scheduler that is told."""
 
 import logging
+import multiprocessing
 import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -23,6 +24,12 @@ Connect = Callable[[], "AbstractContextManager[Client]"]
 CONNECT_S: Final = 20.0
 LOOPBACK: Final = "127.0.0.1"
 _BEFORE_WORKERS: Final = "distributed.nanny.pre-spawn-environ"
+_METHOD: Final = "distributed.worker.multiprocessing-method"
+#: What a worker works with, those among it that other modules import when they are first used.
+_PRELOADED: Final = (
+    "distributed.nanny", "distributed.worker", "distributed.comm.tcp", "pandas", "pyarrow.compute",
+    "chladni.apps.study.work", "chladni.io.mcap_log", "chladni.io.file_log", "chladni.io.log_survey",
+)  # fmt: skip
 _LOGGERS: Final = ("distributed", "tornado", "asyncio")
 
 
@@ -121,6 +128,7 @@ def _of_this_machine(workers: int | None, *, dashboard: bool) -> "Iterator[Clien
         TemporaryDirectory(prefix="chladni-workers-", ignore_cleanup_errors=True) as folder,
         quiet(),
         settings(),
+        _forked(),
         LocalCluster(
             n_workers=count,
             threads_per_worker=1,
@@ -138,6 +146,36 @@ def _of_this_machine(workers: int | None, *, dashboard: bool) -> "Iterator[Clien
         Client(local) as client,
     ):
         yield client
+
+
+@contextmanager
+def _forked() -> "Iterator[None]":
+    """Let workers be forks of one process that has imported all they work with, where the system has such.
+
+    What they import takes seconds, which each worker that starts on its own takes again.
+    """
+    import dask
+
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        yield
+        return
+    from multiprocessing import forkserver
+
+    multiprocessing.get_context("forkserver").set_forkserver_preload(list(_PRELOADED))
+    # What has to be known before the first import is known by whoever imports.
+    told = {name: str(value) for name, value in dask.config.get(_BEFORE_WORKERS).items()}
+    before = {name: os.environ.get(name) for name in told}
+    os.environ.update(told)
+    try:
+        forkserver.ensure_running()
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+    with dask.config.set({_METHOD: "forkserver"}):
+        yield
 
 
 def _own_keys() -> "Security":

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
@@ -323,3 +324,6 @@ def test_a_worker_that_was_ended_is_started_again() -> None:
             time.sleep(0.5)
         [second] = own.run(os.getpid).values()
         assert second != first
+        # It's a fork of what has imported all that work takes: none of it is imported again.
+        [loaded] = own.run(lambda: "chladni.apps.study.work" in sys.modules).values()
+        assert loaded
