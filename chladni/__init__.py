@@ -124,6 +124,7 @@ _HOME = {
     "joint_log": "chladni.robots.joint_log",
     "load_robot": "chladni.robots.loading",
     "write_trajectory": "chladni.robots.trajectory",
+    "Bearing": "chladni.signals.bearing",
     "Cepstrum": "chladni.signals.cepstrum",
     "Channel": "chladni.signals.channel",
     "Coherence": "chladni.signals.coherence",
@@ -131,7 +132,6 @@ _HOME = {
     "TimeDelays": "chladni.signals.cross_correlation",
     "CrossSpectra": "chladni.signals.cross_spectra",
     "DeflectionShapes": "chladni.signals.deflection_shapes",
-    "Bearing": "chladni.signals.envelope",
     "EnvelopeSpectrum": "chladni.signals.envelope",
     "Kurtogram": "chladni.signals.envelope",
     "ChladniError": "chladni.signals.errors",
@@ -331,6 +331,7 @@ if TYPE_CHECKING:
     from chladni.robots.joint_log import joint_log as joint_log
     from chladni.robots.loading import load_robot as load_robot
     from chladni.robots.trajectory import write_trajectory as write_trajectory
+    from chladni.signals.bearing import Bearing as Bearing
     from chladni.signals.cepstrum import Cepstrum as Cepstrum
     from chladni.signals.channel import Channel as Channel
     from chladni.signals.coherence import Coherence as Coherence
@@ -338,7 +339,6 @@ if TYPE_CHECKING:
     from chladni.signals.cross_correlation import TimeDelays as TimeDelays
     from chladni.signals.cross_spectra import CrossSpectra as CrossSpectra
     from chladni.signals.deflection_shapes import DeflectionShapes as DeflectionShapes
-    from chladni.signals.envelope import Bearing as Bearing
     from chladni.signals.envelope import EnvelopeSpectrum as EnvelopeSpectrum
     from chladni.signals.envelope import Kurtogram as Kurtogram
     from chladni.signals.errors import ChladniError as ChladniError

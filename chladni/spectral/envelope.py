@@ -8,8 +8,9 @@ import numpy as np
 
 from chladni.io.missing_samples import MissingSamples
 from chladni.io.source import Blocks, SeriesLike, blocks_of, extent_of, log_or_series
+from chladni.signals.bearing import Bearing
 from chladni.signals.channel import Channel, Names
-from chladni.signals.envelope import Bearing, EnvelopeSpectrum, FaultLine, Kurtogram
+from chladni.signals.envelope import EnvelopeSpectrum, FaultLine, Kurtogram
 from chladni.signals.errors import SetupError
 from chladni.signals.number_range import require_in_range
 from chladni.signals.peak import Peak
