@@ -295,7 +295,6 @@ def _dress(plot: Any, axes: Axes, figure: Figure, *, numbered: bool) -> None:
     for axis in (*plot.xaxis, *plot.yaxis):
         _dressed(axis)
     if not numbered:
-        plot.xaxis.major_label_text_font_size = "0px"
         plot.xaxis.axis_label = None
     for axis, of_figure in ((plot.xaxis, axes.xaxis), (plot.yaxis, axes.yaxis)):
         formatter = of_figure.get_major_formatter()
@@ -306,9 +305,17 @@ def _dress(plot: Any, axes: Axes, figure: Figure, *, numbered: bool) -> None:
             names = [inert(formatter(tick, place)) for place, tick in enumerate(ticks)]
             axis.ticker = FixedTicker(ticks=ticks)
             axis.major_label_overrides = dict(zip(ticks, names, strict=True))
+    if not numbered:
+        _unnumber(plot.xaxis)
     if not axes.yaxis.get_tick_params().get("labelleft", True):
         # Numbered where the row begins.
-        plot.yaxis.major_label_text_font_size = "0px"
+        _unnumber(plot.yaxis)
+
+
+def _unnumber(axis: Any) -> None:
+    axis.major_label_text_font_size = "0px"
+    # Powers with raised exponents have no size at this one, and the plot isn't drawn.
+    axis.formatter = PrintfTickFormatter(format="%g")
 
 
 def _fitted(name: str, height_in: float) -> str:

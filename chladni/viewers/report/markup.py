@@ -45,7 +45,8 @@ figure { margin: 0 0 1rem; padding: .6rem; border: 1px solid var(--line); border
 figure img { display: block; width: 100%; height: auto; }
 figure.square img { max-width: 40rem; }
 figcaption { color: var(--soft); font-size: .8rem; padding-top: .3rem; }
-figure + .scroll, .figures + .scroll, .pair + .scroll { margin-top: 1rem; }
+figure + .scroll, .figures + .scroll, .pair + .scroll, .scroll + .figures, .scroll + figure, .figures + .figures,
+.figures + figure, .figures + .pair { margin-top: 1rem; }
 .plot { overflow-x: auto; overflow-y: hidden; }
 @media (min-width: 64rem) {
   .pair { display: grid; grid-template-columns: minmax(0, 1fr) 26.5rem; gap: 1rem; align-items: start; }

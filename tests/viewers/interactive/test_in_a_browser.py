@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from chladni.signals.study import Study
+from chladni.viewers.figures.album import Album
+from chladni.viewers.figures.log_axis import Scales
 from chladni.viewers.report import report_html
 from tests.viewers import synthetic
 
@@ -100,6 +102,19 @@ def test_a_plot_reads_out_the_value_under_the_cursor(browser: Any, spectra: str,
     assert float(words[1]) == pytest.approx(density.frequency_hz[line], rel=1e-6)
     assert words[2] == "wrist.x: "
     assert float(words[3]) == pytest.approx(density.values[3, line], rel=1e-4)
+    page.close()
+    assert alarms == []
+
+
+def test_panes_that_share_a_logarithmic_axis_are_drawn(browser: Any, tmp_path: Path) -> None:
+    # The upper of them don't number it; over several decades its numbers have raised exponents.
+    alarms: list[str] = []
+    response = synthetic.frequency_response()
+    decades_hz = np.geomspace(0.01, 100.0, response.frequency_hz.size)
+    study = Study(title="frf", response=replace(response, frequency_hz=decades_hz))
+    album = Album.of(study, scales=Scales(log_frequency=True))
+    page = opened(browser, report_html(study, album=album), tmp_path / "r.html", alarms)
+    assert page.query_selector_all(".plot[data-drawn=yes]")
     page.close()
     assert alarms == []
 
