@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import BinaryIO
 
 from chladni.signals.errors import ChladniError
+from chladni.signals.visible import visible
 
 _KINDS = (
-    (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a named pipe"),
     (stat.S_ISSOCK, "a socket"),
     (stat.S_ISCHR, "a device"),
@@ -42,8 +42,20 @@ def require_regular(path: Path, kind: type[ChladniError]) -> None:
         # A name may hold what no file's does.
         raise kind(f"{path}: can't be read: {getattr(error, 'strerror', None) or error}") from None
     if not stat.S_ISREG(mode):
+        if stat.S_ISDIR(mode):
+            raise kind(f"{path}: is a folder; name a file in it{_such_as(path)}")
         found = next((what for is_it, what in _KINDS if is_it(mode)), "no regular file")
         raise kind(f"{path}: is {found}; files alone are read: write what it gives into one, and name that")
+
+
+def _such_as(folder: Path) -> str:
+    """Name the first of the logs in a folder, and for a recording in several files what puts them together."""
+    try:
+        parts = sorted(folder.glob("*.mcap"))
+    except OSError:
+        return ""
+    merge = f"; 'mcap merge' makes one file of its {len(parts)} .mcap files" if len(parts) > 1 else ""
+    return f", such as {visible(parts[0].name)}{merge}" if parts else ""
 
 
 def read_text(path: Path, most_bytes: int, kind: type[ChladniError]) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,10 +26,24 @@ from chladni.signals.value import Coordinate, Value, of_channel, require_shape
 from chladni.signals.wording import counted
 
 NS_PER_S = 1_000_000_000
-#: Numbers of one channel or of several, ``[channel, sample]``, or those of each channel by its name.
-Arrays = ArrayLike | Mapping[str, ArrayLike]
 _CENTURIES_NS = 2**63
 """What nanoseconds of 64 bits count to, either way from 1970."""
+
+
+@runtime_checkable
+class Frame(Protocol):
+    """A table of pandas or polars: a channel in each column, time down the rows."""
+
+    @property
+    def columns(self) -> Iterable[Any]:
+        """Names of the columns."""
+
+    def __getitem__(self, name: Any, /) -> Any:
+        """Give a column."""
+
+
+#: Numbers of one channel or of several, ``[channel, sample]``, or those of each channel by its name.
+Arrays = ArrayLike | Mapping[str, ArrayLike] | Frame
 
 
 def is_sample_rate(rate_hz: float) -> bool:
@@ -126,8 +140,9 @@ class TimeSeries(Value):
         Parameters
         ----------
         values
-            ``[channel, sample]``, ``[sample]`` of one channel, or the samples of each channel by its name. NaN, or
-            what is infinite, is a sample that is missing, and is marked so.
+            ``[channel, sample]``, ``[sample]`` of one channel, the samples of each channel by its name, or a table of
+            pandas or polars with a channel in each column. What is NaN, infinite or masked is a sample that is
+            missing, and is marked so.
         sample_rate_hz
             Samples a second.
         names
@@ -244,10 +259,12 @@ class TimeSeries(Value):
 
 def _table(values: Arrays, names: tuple[str, ...] | None) -> tuple[NDArray[np.floating], tuple[str, ...]]:
     """Give numbers as ``[channel, sample]``, and the name of each channel."""
+    if isinstance(values, Frame):
+        values = _columns(values)
     if isinstance(values, Mapping):
         if names is not None:
             raise EstimateError("values come with names already; leave names out")
-        names, values = tuple(map(str, values)), [np.ravel(one) for one in values.values()]
+        names, values = tuple(map(str, values)), [_channel(name, one) for name, one in values.items()]
     table = np.atleast_2d(_real(values))
     if table.ndim != 2 or not table.size:
         raise EstimateError(
@@ -261,7 +278,26 @@ def _table(values: Arrays, names: tuple[str, ...] | None) -> tuple[NDArray[np.fl
     return table, numbered("ch", count, names)
 
 
+def _columns(frame: Frame) -> dict[str, ArrayLike]:
+    """Give the columns of a table by their names."""
+    names = [str(name) for name in frame.columns]
+    if len(set(names)) != len(names):
+        raise EstimateError(f"channel names must be unique, got {', '.join(names)}")
+    return {name: frame[column] for name, column in zip(names, frame.columns, strict=True)}
+
+
+def _channel(name: object, values: ArrayLike) -> NDArray[np.floating]:
+    try:
+        return _real(values).ravel()
+    except EstimateError as error:
+        raise EstimateError(f"{name}: {error}") from None
+
+
 def _real(values: ArrayLike | Iterable[ArrayLike]) -> NDArray[np.floating]:
+    if isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "iubf":
+        # What is masked wasn't measured, whatever stands there.
+        exact = values.data if values.dtype.kind == "f" else values.data.astype(np.float64)
+        return np.where(np.ma.getmaskarray(values), exact.dtype.type(np.nan), exact)
     try:
         array = np.asarray(values)
     except ValueError as error:

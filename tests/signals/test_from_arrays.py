@@ -74,6 +74,28 @@ def test_a_series_is_refused_by_what_is_wrong(values, options, told):
         made(values, **options)
 
 
+def test_a_table_has_a_channel_in_each_column():
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"f": [1.0, 2.0, np.nan], "a": [3, 4, 5]})
+    found = made(table)
+    assert [channel.name for channel in found.channels] == ["f", "a"]
+    np.testing.assert_array_equal(found.values, [[1.0, 2.0, np.nan], [3.0, 4.0, 5.0]])
+    assert found.valid.tolist() == [[True, True, False], [True] * 3]
+    with pytest.raises(EstimateError, match=r"^s: values are of type"):
+        made(pandas.DataFrame({"a": [1.0, 2.0], "s": ["x", "y"]}))
+    with pytest.raises(EstimateError, match="names must be unique, got a, a"):
+        made(pandas.DataFrame(np.ones((3, 2)), columns=["a", "a"]))
+
+
+@pytest.mark.parametrize("kind", [float, int])
+def test_what_is_masked_was_not_measured(kind):
+    values = np.ma.masked_equal(np.array([[1, 2, 999], [4, 999, 6]], kind), 999)
+    missing = [[True, True, False], [True, False, True]]
+    assert made(values).valid.tolist() == missing
+    assert made({"a": values[0], "b": values[1]}).valid.tolist() == missing
+    assert np.isnan(made(values).values).sum() == 2
+
+
 def test_an_unknown_unit_is_refused():
     with pytest.raises(SetupError, match="'zork'"):
         made([1.0], units="zork")

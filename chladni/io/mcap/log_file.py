@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from chladni.io.mcap.records import MAGIC
+from chladni.io.regular_file import require_regular
 from chladni.signals.errors import LogError
 from chladni.signals.visible import visible
 from chladni.signals.wording import near_words
@@ -66,7 +67,7 @@ class LogFile:
         try:
             # A named pipe would block in open() until someone writes to it.
             if not stat.S_ISREG(path.stat().st_mode):
-                raise LogError(f"{path}: not a file; expected an MCAP log")
+                require_regular(path, LogError)
             self._file = path.open("rb", buffering=0)
         except OSError as error:
             raise LogError(f"{path}: can't be opened: {error.strerror or error}{_beside(path)}") from error

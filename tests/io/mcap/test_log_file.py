@@ -94,13 +94,17 @@ def test_an_empty_file_is_called_empty(tmp_path: Path) -> None:
 
 
 def test_a_folder_a_pipe_and_nothing_are_no_logs(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="not a file"):
+    with pytest.raises(LogError, match=r"is a folder; name a file in it$"):
+        McapContainer.open(tmp_path)
+    for name in ("bag_0.mcap", "bag_1.mcap"):
+        (tmp_path / name).touch()
+    with pytest.raises(LogError, match=r"such as bag_0\.mcap; 'mcap merge' makes one file of its 2 \.mcap files"):
         McapContainer.open(tmp_path)
     with pytest.raises(LogError, match=r"none\.mcap: can't be opened: No such file"):
         McapContainer.open(tmp_path / "none.mcap")
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe")
-        with pytest.raises(LogError, match="not a file"):
+        with pytest.raises(LogError, match="is a named pipe"):
             McapContainer.open(tmp_path / "pipe")
 
 
