@@ -136,6 +136,7 @@ def test_the_viewer_shows_all_pages_without_complaint(file: Path) -> None:
         for page in ("Robot", "Torque residuals", "Friction", "Torque over position"):
             viewer.show(page)
             assert viewer.picture()
+        assert {view.name for view in viewer.views()} >= {"shoulder [N m]", "elbow [N m]"}
         assert viewer.complaints() == []
 
 

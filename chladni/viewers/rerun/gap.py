@@ -12,6 +12,7 @@ from chladni.io.atomic import atomic_write
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.visible import visible
 from chladni.viewers.gap_evidence import GapEvidence
+from chladni.viewers.labels import printed_unit
 from chladni.viewers.rerun.drawing import new_recording
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.gap_map import draw_gap_maps
@@ -120,21 +121,21 @@ def _robot(
         rrb.Horizontal(left, _tabbed(joints), column_shares=[1.4, 1], name="Robot"),
         # A view has one place only.
         rrb.Grid(
-            *(_again(one, name, signals) for one, name in zip(residuals, signals.output_names, strict=True)),
+            *(_again(one, signals, row) for row, one in enumerate(residuals)),
             name="Torque residuals",
         ),
         rrb.Horizontal(_tabbed(torques), name="Torques"),
     ]
 
 
-def _again(view: rrb.View, name: str, signals: GapSignals) -> rrb.View:
-    """Show a plot of the whole log once more, small among others."""
+def _again(view: rrb.View, signals: GapSignals, row: int) -> rrb.View:
+    """Show a plot of the whole log once more, small among others, of which the first names the lines of all."""
     start_ns, end_ns = (round(end * NS_PER_S) for end in signals.span_s)
     return rrb.TimeSeriesView(
         origin=view.origin,
-        name=visible(name),
+        name=f"{visible(signals.output_names[row])} [{printed_unit(signals.output_units[row])}]",
         axis_x=time_axis(end_ns, start_ns=start_ns),
-        plot_legend=rrb.PlotLegend(visible=False),
+        plot_legend=rrb.PlotLegend(visible=row == 0, corner=rrb.Corner2D.LeftTop),
     )
 
 
