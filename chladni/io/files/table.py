@@ -12,13 +12,15 @@ from chladni.io.files.columns import Column, channels_of, distinct, with_units
 from chladni.io.files.contents import FileContents, joined, placed_rows, series_of_rows
 from chladni.io.files.time_column import find_times, is_row_number, rises
 from chladni.io.files.time_reading import NO_TIMES, TimeOptions, Times
-from chladni.signals.arrays import Whole
+from chladni.signals.arrays import Mask, Whole
 from chladni.signals.channel import Channel
 from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.wording import counted
 
 MOST_TOLD = 5
+# Rows that tell a rate of their own; fewer are events.
+LEAST_RECORDED = 8
 
 # A rate that is given and one that the times tell are the same when they're this near; clocks are far truer.
 _SAME_RATE = 0.01
@@ -172,8 +174,53 @@ def series_of_rows_at(
     if times is None:
         series = series_of_rows(rows, channels, sample_rate_hz=_rate_hz(columns, options, where))
         return FileContents(series=(series,), notes=notes, unread=unread, time_bases=(None,))
-    placed = _placed([_floating(row) for row in rows], channels, times, options, where)
-    return replace(placed, notes=notes + placed.notes, unread=unread)
+    floating = [_floating(row) for row in rows]
+    placed = _placed_apart(floating, channels, times, options, where)
+    return replace(placed, notes=tuple(dict.fromkeys(notes + placed.notes)), unread=unread)
+
+
+def _placed_apart(
+    rows: Rows, channels: list[Channel], times: Times, options: TimeOptions, where: str
+) -> FileContents:
+    """Place columns on the grid of the rows that they fill: a table may join what was recorded at several rates.
+
+    Columns that fill few rows, among blank ones all along, are placed by these where they make a sampled signal.
+    """
+    groups: dict[bytes, list[int]] = {}
+    filled = [np.isfinite(row) for row in rows]
+    for place, mask in enumerate(filled):
+        groups.setdefault(mask.tobytes() if _is_scattered(mask) else b"", []).append(place)
+
+    def of(places: list[int], kept: Mask) -> FileContents:
+        # All rows stay where they are: a large table isn't copied.
+        chosen = slice(None) if kept.all() else kept
+        some = replace(times, stamps_ns=times.stamps_ns[chosen], known=times.known[chosen])
+        own_channels = [channels[place] for place in places]
+        return _placed([rows[place][chosen] for place in places], own_channels, some, options, where)
+
+    together = groups.pop(b"", [])
+    found: list[FileContents] = []
+    theirs = np.zeros(times.known.size, np.bool_)
+    for places in groups.values():
+        mask = filled[places[0]]
+        try:
+            found.append(of(places, mask))
+            theirs |= mask
+        except ChladniError:
+            # Events, which stay among the gaps of the table's own grid.
+            together += places
+    if together:
+        # A row that others alone fill is none of these; one that nobody fills is a gap.
+        own = np.logical_or.reduce([filled[place] for place in together])
+        found.insert(0, of(sorted(together), own | ~theirs))
+    return joined(found)
+
+
+def _is_scattered(filled: Mask) -> bool:
+    """Whether at most half of the rows are filled, and most of these stand alone among blank ones."""
+    count = int(np.count_nonzero(filled))
+    runs = int(np.count_nonzero(np.diff(filled.astype(np.int8), prepend=0) == 1))
+    return LEAST_RECORDED <= count <= filled.size / 2 and runs > count / 2
 
 
 def _signals(columns: Sequence[Column], apart: set[str]) -> tuple[list[Column], tuple[tuple[str, str], ...]]:

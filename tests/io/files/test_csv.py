@@ -488,3 +488,22 @@ def test_names_of_several_columns_are_not_the_name_of_one(tmp_path: Path, delimi
 def test_one_column_may_be_called_so(tmp_path: Path, title: str) -> None:
     (tmp_path / "a.csv").write_text(f"made by; x\n{title}\n1.5\n2.5\n")
     np.testing.assert_array_equal(read_csv(tmp_path / "a.csv", sample_rate_hz=100.0).series[0].values, [[1.5, 2.5]])
+
+
+def test_a_table_that_joins_topics_of_several_rates_gives_each_its_own(tmp_path: Path) -> None:
+    # As PlotJuggler writes them: a row for each message of any topic, blank in the columns of the others.
+    fast, slow = np.arange(400) / 100, np.arange(200) / 50 + 0.0013
+    rows = [(t, f"{np.sin(t)}", "", "") for t in fast] + [(t, "", f"{np.cos(t)}", "") for t in slow]
+    # Events come when they like: they stay beside the others.
+    at = sorted(np.random.default_rng(1).choice(rows[:400], 9, replace=False), key=lambda row: float(row[0]))
+    events = {float(row[0]) for row in at}
+    text = "".join(f"{t:.6f},{x},{y},{1 if t in events else z}\n" for t, x, y, z in sorted(rows))
+    (tmp_path / "a.csv").write_text("__time [s],/a/x,/b/y,/event\n" + text)
+    first, second = sorted(read_csv(tmp_path / "a.csv").series, key=lambda one: one.samples, reverse=True)
+    assert [one.name for one in first.channels] == ["/a/x", "/event"]
+    assert [one.name for one in second.channels] == ["/b/y"]
+    assert (first.sample_rate_hz, second.sample_rate_hz) == (pytest.approx(100), pytest.approx(50))
+    np.testing.assert_allclose(first.values[0], np.sin(fast))
+    np.testing.assert_allclose(second.values[0], np.cos(slow))
+    assert np.isfinite(first.values[1]).sum() == 9
+    assert second.valid is None
