@@ -1,5 +1,6 @@
 """What one quantity did from log to log: its values, what a covariate explains of them, and where it changed."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -109,3 +110,16 @@ class Trend(Value):
         for name in ("times_ns", "values", "std", "expected", "explained"):
             require_shape(name, getattr(self, name), (len(self.logs),), "[log]")
         self._freeze()
+
+
+def no_change_sentence(trends: Sequence[Trend]) -> str:
+    """Say that no trend has a step, or that there is none to have one.
+
+    Examples
+    --------
+    >>> no_change_sentence(())
+    'Nothing was followed: a trend needs three logs or more that show the same channel, line or mode.'
+    """
+    if not trends:
+        return "Nothing was followed: a trend needs three logs or more that show the same channel, line or mode."
+    return "Nothing changed beyond what scatter and covariates explain."

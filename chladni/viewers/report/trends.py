@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from chladni.io.atomic import atomic_write
-from chladni.signals.trend import Trend
+from chladni.signals.trend import Trend, no_change_sentence
 from chladni.signals.wording import with_sigma
 from chladni.viewers.figures.album import Album
 from chladni.viewers.figures.trends import trend_figures
@@ -65,7 +65,7 @@ def trend_report_html(page: TrendPage) -> str:
     album = Album(trend_figures(page.trends))
     pictures = Pictures(album)
     body = [element("h1", escaped(page.title))]
-    changes = page.changes or ["Nothing changed beyond what scatter and covariates explain."]
+    changes = page.changes or [no_change_sentence(page.trends)]
     body.append(_section("What changed", _list(changes)))
     body += [_section(heading, table(*content)) for heading, content in page.tables.items() if content[1]]
     body += [_section(heading, pictures.figures(album, heading, _CAPTION)) for heading in album.sections]

@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 
 from chladni.io.atomic import atomic_write
 from chladni.signals.arrays import Whole
-from chladni.signals.trend import Trend
+from chladni.signals.trend import Trend, no_change_sentence
 from chladni.signals.visible import visible
 from chladni.viewers.figures.trends import SECTIONS, dates_around
 from chladni.viewers.labels import printed_unit
@@ -59,7 +59,7 @@ def write_trend_rrd(
 def draw_trends(recording: rr.RecordingStream, trends: Sequence[Trend], changes: Sequence[str], *, name: str) -> None:
     """Write trends and their blueprint into a recording that is connected already."""
     recording.send_recording_name(visible(name))
-    told = "\n".join(f"- {visible(one)}" for one in changes) or "Nothing changed beyond scatter and covariates."
+    told = "\n".join(f"- {visible(one)}" for one in changes) or no_change_sentence(trends)
     recording.log("/changes", rr.TextDocument(told, media_type="text/markdown"), static=True)
     pages: list[rrb.Container | rrb.View] = []
     for kind, heading in SECTIONS.items():
