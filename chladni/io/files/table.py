@@ -286,6 +286,9 @@ def _placed(rows: Rows, channels: list[Channel], times: Times, options: TimeOpti
     if away is not None:
         notes.append(f"{where}: {counted(int(np.count_nonzero(away)), 'row')} left out, whose time is no time.")
         stamps_ns, rows = stamps_ns[~away], [row[~away] for row in rows]
+    if stamps_ns.size > 2 and (np.diff(stamps_ns) < 0).all():
+        notes.append(f"{where}: its rows stand in falling order of time, and were put in order.")
+        stamps_ns, rows = stamps_ns[::-1], [row[::-1] for row in rows]
     placed = _at_rate(stamps_ns, rows, channels, options, where)
     found_hz, stated_hz = placed.series[0].sample_rate_hz, options.stated_rate_hz
     if stated_hz is not None and abs(found_hz / stated_hz - 1) > _SAME_RATE:

@@ -237,16 +237,22 @@ def _is_remainder(whole: Column, part: Column) -> bool:
 
 def _may_be_time(column: Column, texts: dict[str, TextTimes]) -> bool:
     if column.name in texts:
-        return _mostly_rising(texts[column.name].stamps_ns[texts[column.name].known])
+        stamps_ns = texts[column.name].stamps_ns[texts[column.name].known]
+        return _mostly_rising(stamps_ns) or _falls(stamps_ns)
     if column.numbers is None or column.numbers.dtype.kind not in "fiumM":
         return False
     said = spelled(column.unit or "")
     if said not in ("", "1", *UNIT_OF) and is_unit(column.unit or ""):
         return False
     if column.numbers.dtype.kind in "mM" or is_time_name(column.name):
-        return _mostly_rising(column.numbers)
+        # A unit of time beside the name tells times that run backwards, as of a list with the newest first.
+        return _mostly_rising(column.numbers) or (said in UNIT_OF and _falls(column.numbers))
     # In a language that isn't known, the unit and a rise from row to row still tell a clock.
     return said in UNIT_OF and rises(column)
+
+
+def _falls(numbers: NDArray[Any]) -> bool:
+    return numbers.size > 2 and bool((numbers[1:] < numbers[:-1]).all())
 
 
 def _mostly_rising(numbers: NDArray[Any]) -> bool:

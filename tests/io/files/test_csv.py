@@ -507,3 +507,14 @@ def test_a_table_that_joins_topics_of_several_rates_gives_each_its_own(tmp_path:
     np.testing.assert_allclose(second.values[0], np.cos(slow))
     assert np.isfinite(first.values[1]).sum() == 9
     assert second.valid is None
+
+
+@pytest.mark.parametrize("time", ["{:.2f}", "2024-03-05 10:00:{:05.2f}"])
+def test_rows_in_falling_order_of_time_are_put_in_order(tmp_path: Path, time: str) -> None:
+    values = np.random.default_rng(1).standard_normal(300)
+    rows = [f"{time.format(place / 50)},{value}\n" for place, value in enumerate(values.tolist())]
+    (tmp_path / "a.csv").write_text("t [s],a\n" + "".join(reversed(rows)))
+    found = read_csv(tmp_path / "a.csv")
+    assert found.series[0].sample_rate_hz == pytest.approx(50)
+    np.testing.assert_allclose(found.series[0].values[0], values)
+    assert any("in falling order of time" in note for note in found.notes)
