@@ -21,8 +21,8 @@ from chladni.signals.errors import ModelError
 
 #: Times that columns are made anew for what was found, until that moves by less than so many seconds and metres.
 _SHIFTS, _SETTLED_S, _SETTLED_M = 5, 1e-4, 2e-3
-#: Deviations of its mass from which a payload has a place.
-_TOLD_BY = 2.0
+#: Deviations of its mass from which a payload has a place, and down to which it keeps it.
+_TOLD_BY, _KEPT_BY = 2.0, 1.0
 #: Times that gains which nobody says are guessed anew, until they move by less.
 _GUESSES, _SETTLED_GAIN = 2, 0.05
 #: Of a form: by how little it moves when it has settled.
@@ -60,9 +60,7 @@ class Solved:
         term = self.best.terms[place]
         values, deviations = self.best.values(place)
         if (term.word, term.site) == ("delay", ALL_COMMANDS):
-            # Where commands wait for the loop's turn, too, is the whole delay.
-            turn = LOOP_S * self.contest.tolerances(self.best)["turn"][0]
-            found = {"delay": (float(values[0]) + turn, float(deviations[0]), "s")}
+            found = {"delay": (float(values[0]) + _turn_s(self.contest, self.best), float(deviations[0]), "s")}
         elif term.word in TOLD:
             found = TOLD[term.word](term, values, deviations)
         else:
@@ -177,7 +175,7 @@ def _settled(
     for _ in range(_SHIFTS):
         forms, spread = refined(contest, best, contest.torques.guesses.forms)
         leveled = contest.torques.with_level(contest.quietest(best)) if levels else contest.torques
-        guessed = leveled.with_guesses(_guesses(contest.torques, best, forms), contest.explained(best))
+        guessed = leveled.with_guesses(_guesses(contest, best, forms), contest.explained(best))
         if _is_settled(contest.torques, guessed):
             break
         contest = Contest(guessed, left_out)
@@ -185,18 +183,31 @@ def _settled(
     return Solved(contest=contest, best=best, spread=spread)
 
 
-def _guesses(torques: Torques, fit: Fit, forms: Forms) -> Guesses:
+def _guesses(contest: Contest, fit: Fit, forms: Forms) -> Guesses:
     """Delays beyond the described one, centres of payloads whose mass is told, offsets, and forms."""
+    torques = contest.torques
     late, centres, offset = {}, {}, {}
     for place, term in enumerate(fit.terms):
         values, deviations = fit.values(place)
         if term.word == "delay":
-            late[term.site] = float(values[0]) - torques.robot.delay_s * (term.site == ALL_COMMANDS)
-        elif term.word == "payload" and values[0] > _TOLD_BY * deviations[0]:
+            late[term.site] = float(values[0])
+            if term.site == ALL_COMMANDS:
+                late[term.site] += _turn_s(contest, fit) - torques.robot.delay_s
+        elif term.word == "payload" and values[0] > _placed_from(torques, term.site) * deviations[0]:
             centres[term.site] = np.asarray(values[1:4] / values[0])
         elif term.word == "encoder_offset" and term.variant == OF_THE_LOG:
             offset[term.site] = float(values[0])
     return Guesses(late_s=late, centre_m=centres, offset=offset, forms=forms)
+
+
+def _placed_from(torques: Torques, link: str) -> float:
+    """Deviations of a payload's mass from which it has a place: what has one makes its mass another."""
+    return _KEPT_BY if link in torques.guesses.centre_m else _TOLD_BY
+
+
+def _turn_s(contest: Contest, fit: Fit) -> float:
+    """How long commands wait for the loop's turn: a part of the delay of all, of which it's a slope about the guess."""
+    return LOOP_S * contest.tolerances(fit)["turn"][0]
 
 
 def _is_settled(before: Torques, after: Torques) -> bool:
