@@ -57,7 +57,7 @@ def diagnose_gap(
         A log or data file, or several: their paths, opened, or series. Channels are those that the model's inputs and
         outputs name.
     leave_out
-        Words of effects that don't take part.
+        Words of effects that don't take part; of a robot at one site as ``word@site``.
     own_effects
         Effects of your own that take part, see docs/effects.md.
     seed

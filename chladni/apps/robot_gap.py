@@ -37,7 +37,7 @@ def robot_gap(
     from chladni.gap.robots.words import ROBOT_WORDS
 
     left_out, known = frozenset(leave_out), (*ROBOT_WORDS, *WITHOUT_COLUMN)
-    for word in sorted(left_out.difference(known)):
+    for word in sorted({each.partition("@")[0] for each in left_out}.difference(known)):
         raise SetupError(f"no effect {word!r} of a robot to leave out; {nearest(word, known, 'effects')}")
     if len(logs) != 1:
         raise SetupError(f"{len(logs)} logs beside robot {robot.name!r}; a robot is diagnosed on one log at a time")

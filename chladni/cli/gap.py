@@ -45,7 +45,11 @@ Simulated = Annotated[
 ]
 Without = Annotated[
     list[str] | None,
-    typer.Option(metavar="EFFECT", help="Leave this effect out; may be repeated.", show_default=False),
+    typer.Option(
+        metavar="EFFECT",
+        help="Leave this effect out (of a robot at one site: EFFECT@SITE); may be repeated.",
+        show_default=False,
+    ),
 ]
 Seed = Annotated[
     int, typer.Option(metavar="N", min=0, help="Start of the random numbers; the same seed gives the same answer.")

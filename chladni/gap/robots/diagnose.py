@@ -7,9 +7,12 @@ from chladni.gap.robots.answer import Answer
 from chladni.gap.robots.pushes import PUSHED
 from chladni.gap.robots.solved import solved
 from chladni.gap.robots.support import require_in_the_air
-from chladni.gap.robots.torques import torques_of
+from chladni.gap.robots.torques import Torques, torques_of
+from chladni.gap.robots.words import all_terms
+from chladni.models.effects.wording import nearest
 from chladni.robots.joint_log import JointLog
 from chladni.robots.robot import Robot
+from chladni.signals.errors import SetupError
 from chladni.signals.linear_algebra import in_one_thread
 
 StepProgress = Callable[[str, float], None]
@@ -35,7 +38,7 @@ def diagnose_robot(
     Parameters
     ----------
     leave_out
-        Words that don't take part.
+        Words, and words at a site as ``word@site``, that don't take part.
     progress
         Called with the name of the step and the share done.
 
@@ -45,11 +48,14 @@ def diagnose_robot(
         When MuJoCo isn't installed, or nothing tells the torque of any joint.
     LogError
         When the log has no stretch that is long enough.
+    SetupError
+        When a word that is left out at a site can't be there.
     """
     tell = progress or (lambda _step, _share: None)
     tell("locating", 0.0)
     torques = torques_of(robot, log)
     require_in_the_air(torques)
+    _require_sites(torques, leave_out)
     tell("explaining", 0.2)
     found = solved(torques, leave_out, lambda share: tell("explaining", 0.2 + 0.6 * share))
     tell("measuring the closing", 0.9)
@@ -61,3 +67,14 @@ def diagnose_robot(
     told = answer.diagnosis()
     tell("measuring the closing", 1.0)
     return told
+
+
+def _require_sites(torques: Torques, left_out: frozenset[str]) -> None:
+    for each in sorted(left_out):
+        word, at, site = each.partition("@")
+        if not at:
+            continue
+        sites = {term.site for term in all_terms(torques) if term.word == word}
+        if site not in sites:
+            advice = nearest(site, sorted(sites), "sites") if sites else f"leave it out everywhere with {word}"
+            raise SetupError(f"no {word} at {site!r} to leave out; {advice}")

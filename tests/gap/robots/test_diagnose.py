@@ -198,13 +198,16 @@ def test_the_facade_takes_a_robot_and_its_bag(tmp_path: Path) -> None:
     ]
     chladni.write_mcap(series, bag)
     # A word that has no column yet is one all the same.
-    found = chladni.diagnose_gap(robot.description, bag, leave_out=["backlash"])
+    found = chladni.diagnose_gap(robot.description, bag, leave_out=["backlash", "hysteresis@shoulder"])
     assert named(found) == {("coulomb_friction", "shoulder")}
+    assert ("hysteresis", "shoulder") not in {(one.effect, one.site) for one in found.answer_set}
     assert found.used[0].log == "arm.mcap"
     with pytest.raises(SetupError, match="one log at a time"):
         chladni.diagnose_gap(robot.description, [bag, bag])
     with pytest.raises(SetupError, match="no effect 'coulomb' of a robot"):
         chladni.diagnose_gap(robot.description, bag, leave_out=["coulomb"])
+    with pytest.raises(SetupError, match=r"no payload at 'shoulder' to leave out; sites: fore, upper"):
+        chladni.diagnose_gap(robot.description, bag, leave_out=["payload@shoulder"])
     with pytest.raises(SetupError, match="commands of a robot are always held"):
         chladni.diagnose_gap(robot.description, bag, join="hold")
 
