@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from chladni.gap.calibration import CLOSE, COVERAGE, LAPSE, LEAST_SHARE, NAMED, TEMPER
+from chladni.gap.calibration import CLOSE, COVERAGE, DETAILS, LAPSE, LEAST_SHARE, NAMED, TEMPER
 from chladni.gap.comparison.shares import band_shares, regime_shares, relative_residual
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.records.diagnosis import (
@@ -99,6 +99,16 @@ class Answer:
         found = self._simulated
         return bool(self.named) and found is not None and found.after < _HALF * found.tuned
 
+    def ahead_of(self, other: "Answer") -> float:
+        """Nats by which this answer is ahead of another: of its torques, and of the error that its simulation leaves.
+
+        What a simulation leaves are details of the named laws.
+        """
+        own, others = self._simulated, other._simulated
+        if own is None or others is None or not (self.named and np.isfinite(own.after)):
+            return -np.inf
+        return self._best.nats - other._best.nats + 2.0 * DETAILS * float(np.log(others.after / own.after))
+
     @property
     def _simulated(self) -> Confirmed | None:
         """What simulation says of the names; None where it can't be run, or runs go astray."""
@@ -164,8 +174,25 @@ class Answer:
         named = [(self._best.terms.index(one.term), one.candidate, one.share) for one in weighed]
         return next_measurement(self._contest, self._best, named, unexplained)
 
-    def diagnosis(self) -> Diagnosis:
-        """Give the record."""
+    def _cause(self, one: "Weighed", rival: "Answer | None") -> Cause:
+        """Give a cause, less sure as far as another answer without it comes close."""
+        if rival is None or one.candidate in {each.candidate for each in rival.named}:
+            return one.cause
+        nats = self.ahead_of(rival)
+        near = [each.candidate for each in rival.named if set(each.acts) & set(one.acts) and nats < CLOSE]
+        return replace(
+            one.cause, probability=one.probability / (1.0 + float(np.exp(-nats / TEMPER))),
+            alternatives=tuple(dict.fromkeys([*one.others, *near])),
+        )  # fmt: skip
+
+    def diagnosis(self, rival: "Answer | None" = None) -> Diagnosis:
+        """Give the record.
+
+        Parameters
+        ----------
+        rival
+            An answer that is less probable, of other words.
+        """
         solved = self.solved
         joints = [solved.torques.name_of(row) for row in self.unexplained]
         told = self._contest.fit([one.term for one in self.named])
@@ -173,7 +200,7 @@ class Answer:
             model=solved.torques.robot.name,
             logs=(solved.torques.log.log,),
             verdict=self.verdict,
-            causes=tuple(one.cause for one in self.named) or tuple(one.cause for one in self.solved.pushes),
+            causes=tuple(self._cause(one, rival) for one in self.named) or tuple(one.cause for one in self.solved.pushes),
             ranking=tuple(_ranking(self.weighed)),
             where=_where(solved, self._contest.nothing),
             left=_where(solved, self._best) if self.verdict == "unknown" else None,
@@ -189,6 +216,12 @@ class Answer:
             answer_set=tuple(dict.fromkeys(each for one in self.weighed for each in (one.candidate, *one.others))),
             coverage=COVERAGE,
         )
+
+
+def likelier(one: Answer, other: Answer) -> tuple[Answer, Answer | None]:
+    """Give the likelier answer of two first, and the other where it could stand in its place."""
+    first, second = (other, one) if other.ahead_of(one) > 0 else (one, other)
+    return first, second if second.ahead_of(first) > -np.inf else None
 
 
 def _without_worst(named: tuple["Weighed", ...], found: Confirmed) -> tuple["Weighed", ...]:

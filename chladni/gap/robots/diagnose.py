@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from chladni.gap.records.diagnosis import Diagnosis
-from chladni.gap.robots.answer import Answer
+from chladni.gap.robots.answer import Answer, likelier
 from chladni.gap.robots.pushes import PUSHED
 from chladni.gap.robots.solved import solved
 from chladni.gap.robots.support import require_in_the_air
@@ -59,12 +59,12 @@ def diagnose_robot(
     tell("explaining", 0.2)
     found = solved(torques, leave_out, lambda share: tell("explaining", 0.2 + 0.6 * share))
     tell("measuring the closing", 0.9)
-    answer = Answer(solved=found)
+    answer, rival = Answer(solved=found), None
     if answer.to_leave_out:
         # A law that looks alike in torques may follow the motion where the likeliest doesn't.
         other = Answer(solved=solved(torques, leave_out | answer.to_leave_out, lambda _: None))
-        answer = other if other.is_confirmed() else answer
-    told = answer.diagnosis()
+        answer, rival = likelier(answer, other)
+    told = answer.diagnosis(rival)
     tell("measuring the closing", 1.0)
     return told
 

@@ -1,7 +1,7 @@
 """Words of drives: gains, delays, lags, limits, dead zones."""
 
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -140,19 +140,21 @@ def delays(torques: Torques) -> Iterator[Term]:
         variant = None if secant_s is None else f"over {secant_s:g} s"
         # About what was found already a slope is exact.
         if secant_s is None or ALL_COMMANDS not in late_s:
-            late = torques.late(0.0, common if secant_s is None else secant_s)
-            make = partial(_at_all_servos, torques, late)
+            make = partial(_at_all_servos, torques, common if secant_s is None else secant_s)
             yield Term(word="delay", site=ALL_COMMANDS, make=make, numbers=(delay,), variant=variant)
-        late = torques.late(common, 0.0 if secant_s is None else secant_s)
+        late = cache(partial(torques.late, common, secant_s or 0.0))
         for row, joint in torques.rows:
             found = late_s.get(joint.name, 0.0)
             if secant_s is not None and found:
                 continue
-            alone = torques.late(common, found)[row] if found else late[row]
-            make = partial(at_row, torques, torques.servo_row(row), alone)
+            make = partial(_late_at, torques, row, partial(torques.late, common, found) if found else late)
             # One line carries the commands of all.
             yield Term(word="delay", site=joint.name, make=make, numbers=(own,), variant=variant, rare=True)
 
 
-def _at_all_servos(torques: Torques, column: Real) -> Real:
-    return torques.at_servos(column)[None]
+def _at_all_servos(torques: Torques, late_s: float) -> Real:
+    return torques.at_servos(torques.late(0.0, late_s))[None]
+
+
+def _late_at(torques: Torques, row: int, late: Callable[[], Real]) -> Real:
+    return at_row(torques, torques.servo_row(row), late()[row])

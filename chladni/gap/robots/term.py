@@ -217,7 +217,11 @@ def at_row(torques: Torques, row: int, *columns: Real) -> Real:
 
 def usual(torques: Torques, row: int) -> float:
     """Torque that a joint usually gives."""
-    return max(float(np.std(torques.drive[row])), float(torques.highest_noise[row]))
+    memory = torques.memory
+    if "usual" not in memory:
+        changes = np.std(torques.drive, axis=1)
+        memory["usual"] = np.maximum(changes, torques.highest_noise[: changes.size])
+    return float(memory["usual"][row])
 
 
 def units(joint: RobotJoint) -> tuple[str, str, str]:
