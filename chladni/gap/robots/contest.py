@@ -24,6 +24,8 @@ from chladni.signals.arrays import Index, Mask, Real
 #: Information over the prior's: what a log tells less of stays where it's believed.
 _UNTOLD = 1e-3
 _ROUNDS, _NEAR = 8, 3
+#: Fits that are kept, those that were asked for last: twice as many as a search looks at around one set.
+_KEPT = 512
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -174,10 +176,15 @@ class Contest:
             A fit of nearly the same set, whose weights are begun with.
         """
         key = tuple(map(id, terms)), None if near is None else near.weight.tobytes()
-        if key not in self._fits:
+        found = self._fits.pop(key, None)
+        if found is None:
             begin, rounds = (self._start, _ROUNDS) if near is None else (near.weight, _NEAR)
-            self._fits[key] = self._fit(terms, begin, rounds)
-        return self._fits[key]
+            found = self._fit(terms, begin, rounds)
+        # What was asked for last stands last.
+        self._fits[key] = found
+        if len(self._fits) > _KEPT:
+            del self._fits[next(iter(self._fits))]
+        return found
 
     def _fit(self, terms: Sequence[Term], weight: Real, rounds: int) -> Fit:
         chosen = self._chosen(terms)

@@ -86,7 +86,7 @@ def test_a_dead_zone_takes_all_so_that_its_width_is_told(tmp_path: Path) -> None
 
 def test_about_a_delay_that_was_found_only_its_slope_is_left(tmp_path: Path) -> None:
     robot = arm(tmp_path)
-    found = without_noise(robot, as_described(robot), late=3)
+    found = without_noise(robot, as_described(robot), late=7)
     common, own = (
         {term.variant for term in found.contest.terms if term.word == "delay" and term.site == site}
         for site in (ALL_COMMANDS, "shoulder")
@@ -94,7 +94,9 @@ def test_about_a_delay_that_was_found_only_its_slope_is_left(tmp_path: Path) -> 
     assert common == {None}
     assert len(own) > 1
     assert [term.key for term in found.best.terms] == [("delay", ALL_COMMANDS)]
-    assert found.best.values(0)[0][0] == pytest.approx(3 / RATE_HZ, abs=5e-4)
+    assert found.best.values(0)[0][0] == pytest.approx(7 / RATE_HZ, abs=5e-4)
+    # Waiting for the loop's turn takes no part of it.
+    assert abs(found.contest.tolerances(found.best)["turn"][0]) < 0.5
 
 
 @given(seed=st.integers(0, 2**32 - 1), acting=st.lists(st.booleans(), min_size=2, max_size=8))
