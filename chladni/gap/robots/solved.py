@@ -125,6 +125,9 @@ def solved(torques: Torques, left_out: frozenset[str], progress: Callable[[float
         before = dict(zip(torques.log.joints, torques.kp.tolist(), strict=True))
         if all(abs(kp / before[name] - 1.0) < _SETTLED_GAIN for name, (kp, _) in gains.items()):
             break
+        # What was found by the last guess is large, and laws hold the torques that hold them.
+        del found
+        torques.memory.clear()
         torques = _guessing(torques, gains)
         found = _without_pushes(torques, left_out, progress)
     return found
