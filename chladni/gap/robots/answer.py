@@ -89,14 +89,14 @@ class Answer:
     @cached_property
     def to_leave_out(self) -> frozenset[str]:
         """What simulation confirms least, as ``word@site``: others that fit those torques may follow the motion."""
-        if not self._suggested or self._simulated is None or self.is_confirmed():
+        if not self._suggested or self.simulated is None or self.is_confirmed():
             return frozenset()
-        left = _without_worst(self._suggested, self._simulated)
+        left = _without_worst(self._suggested, self.simulated)
         return frozenset(f"{one.term.word}@{one.term.site}" for one in self._suggested if one not in left)
 
     def is_confirmed(self) -> bool:
         """Whether simulation takes more than half of the error away."""
-        found = self._simulated
+        found = self.simulated
         return bool(self.named) and found is not None and found.after < _HALF * found.tuned
 
     def ahead_of(self, other: "Answer") -> float:
@@ -104,13 +104,15 @@ class Answer:
 
         What a simulation leaves are details of the named laws.
         """
-        own, others = self._simulated, other._simulated
+        own, others = self.simulated, other.simulated
         if own is None or others is None or not (self.named and np.isfinite(own.after)):
             return -np.inf
-        return self._best.nats - other._best.nats + 2.0 * DETAILS * float(np.log(others.after / own.after))
+        return (
+            self.solved.best.nats - other.solved.best.nats + 2.0 * DETAILS * float(np.log(others.after / own.after))
+        )
 
     @property
-    def _simulated(self) -> Confirmed | None:
+    def simulated(self) -> Confirmed | None:
         """What simulation says of the names; None where it can't be run, or runs go astray."""
         return self._confirmed[1]
 
@@ -164,8 +166,8 @@ class Answer:
     @cached_property
     def closing(self) -> Closing:
         """How far the gap closes: of positions, simulated from the log's poses; of torques where runs go astray."""
-        if self._simulated is not None:
-            return _of_positions(self.solved.torques, self._simulated, named=bool(self.named))
+        if self.simulated is not None:
+            return _of_positions(self.solved.torques, self.simulated, named=bool(self.named))
         return _of_torques(self.solved, [one.term for one in self.named])
 
     def _next_measurement(self, unexplained: Sequence[str]) -> str | None:
@@ -200,7 +202,7 @@ class Answer:
             model=solved.torques.robot.name,
             logs=(solved.torques.log.log,),
             verdict=self.verdict,
-            causes=tuple(self._cause(one, rival) for one in self.named) or tuple(one.cause for one in self.solved.pushes),
+            causes=tuple(self._cause(one, rival) for one in self.named) or tuple(one.cause for one in solved.pushes),
             ranking=tuple(_ranking(self.weighed)),
             where=_where(solved, self._contest.nothing),
             left=_where(solved, self._best) if self.verdict == "unknown" else None,

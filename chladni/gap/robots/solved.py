@@ -209,7 +209,7 @@ def _placed_from(torques: Torques, link: str) -> float:
 
 
 def _turn_s(contest: Contest, fit: Fit) -> float:
-    """How long commands wait for the loop's turn: a part of the delay of all, of which it's a slope about the guess."""
+    """How long commands wait for the loop's turn: a part of the delay of all, about whose guess it's a slope."""
     return LOOP_S * contest.tolerances(fit)["turn"][0]
 
 
