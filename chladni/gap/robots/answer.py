@@ -99,18 +99,6 @@ class Answer:
         found = self.simulated
         return bool(self.named) and found is not None and found.after < _HALF * found.tuned
 
-    def ahead_of(self, other: "Answer") -> float:
-        """Nats by which this answer is ahead of another: of its torques, and of the error that its simulation leaves.
-
-        What a simulation leaves are details of the named laws.
-        """
-        own, others = self.simulated, other.simulated
-        if own is None or others is None or not (self.named and np.isfinite(own.after)):
-            return -np.inf
-        return (
-            self.solved.best.nats - other.solved.best.nats + 2.0 * DETAILS * float(np.log(others.after / own.after))
-        )
-
     @property
     def simulated(self) -> Confirmed | None:
         """What simulation says of the names; None where it can't be run, or runs go astray."""
@@ -176,18 +164,17 @@ class Answer:
         named = [(self._best.terms.index(one.term), one.candidate, one.share) for one in weighed]
         return next_measurement(self._contest, self._best, named, unexplained)
 
-    def _cause(self, one: "Weighed", rival: "Answer | None") -> Cause:
+    def _cause(self, one: "Weighed", rival: "Rival | None") -> Cause:
         """Give a cause, less sure as far as another answer without it comes close."""
-        if rival is None or one.candidate in {each.candidate for each in rival.named}:
+        if rival is None or one.candidate in {each.candidate for each in rival.answer.named}:
             return one.cause
-        nats = self.ahead_of(rival)
-        near = [each.candidate for each in rival.named if set(each.acts) & set(one.acts) and nats < CLOSE]
+        there = [each.candidate for each in rival.answer.named if set(each.acts) & set(one.acts)]
         return replace(
-            one.cause, probability=one.probability / (1.0 + float(np.exp(-nats / TEMPER))),
-            alternatives=tuple(dict.fromkeys([*one.others, *near])),
+            one.cause, probability=one.probability / (1.0 + float(np.exp(-rival.behind / TEMPER))),
+            alternatives=tuple(dict.fromkeys([*one.others, *(there if rival.behind < CLOSE else [])])),
         )  # fmt: skip
 
-    def diagnosis(self, rival: "Answer | None" = None) -> Diagnosis:
+    def diagnosis(self, rival: "Rival | None" = None) -> Diagnosis:
         """Give the record.
 
         Parameters
@@ -220,10 +207,28 @@ class Answer:
         )
 
 
-def likelier(one: Answer, other: Answer) -> tuple[Answer, Answer | None]:
-    """Give the likelier answer of two first, and the other where it could stand in its place."""
-    first, second = (other, one) if other.ahead_of(one) > 0 else (one, other)
-    return first, second if second.ahead_of(first) > -np.inf else None
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rival:
+    """An answer that could stand in another one's place, and the nats by which it's behind."""
+
+    answer: Answer
+    behind: float
+
+
+def likelier(one: Answer, other: Answer) -> tuple[Answer, Rival | None]:
+    """Give the likelier answer of two first, and the other where it could stand in its place, for it's confirmed.
+
+    Both are weighed by their torques at the second one's noise, and by the error that their simulations leave, as
+    details of the named laws.
+    """
+    of_one, of_other = one.simulated, other.simulated
+    if of_one is None or of_other is None or not other.is_confirmed():
+        return one, None
+    torques = other.solved.best.nats - other.solved.contest.nats_of(one.solved.best.terms)
+    ahead = torques + 2.0 * DETAILS * float(np.log(of_one.after / of_other.after))
+    if ahead <= 0:
+        return one, Rival(answer=other, behind=-ahead)
+    return other, Rival(answer=one, behind=ahead) if one.named else None
 
 
 def _without_worst(named: tuple["Weighed", ...], found: Confirmed) -> tuple["Weighed", ...]:

@@ -238,6 +238,13 @@ class Contest:
         """Fit a set of another contest, of the same words at the same sites."""
         return self.fit(self.same(fit.terms))
 
+    def nats_of(self, terms: Sequence[Term]) -> float:
+        """Give the evidence of another contest's terms, at this one's noise."""
+        small = self.narrowed([])
+        for term in terms:
+            small = small.joined(term)
+        return small.fit(terms).nats
+
     def same(self, terms: Sequence[Term]) -> list[Term]:
         """Give this contest's terms of the words, sites and forms of another's."""
         forms = {(term.site, *term.kind): term for term in self.terms}
@@ -254,7 +261,9 @@ class Contest:
         every = self._every
         for word, count in Counter((term.word, term.rare) for term in terms).items():
             alone = (log(ANOTHER) - every) * (count - 1)
-            shared = log(ANOTHER) - log(comb(self._words[word], count)) if count > 1 else -np.inf
+            # Terms of another contest may be at sites that are left out here.
+            sites = max(self._words[word], count)
+            shared = log(ANOTHER) - log(comb(sites, count)) if count > 1 else -np.inf
             nats += log(ANOTHER) - every + max(alone, shared)
         # What machines rarely have is one thing more than what most have.
         nats += log(ANOTHER) * sum(term.rare for term in terms)
