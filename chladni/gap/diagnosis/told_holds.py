@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chladni.gap.calibration import BEYOND_DOUBT, PLACES, PROFILE_STEPS
+from chladni.gap.calibration import BEYOND_DOUBT, PLACES
 from chladni.gap.explanation.evidence import Left, highest_level, left_by_force
 from chladni.gap.location.locate import Location
 from chladni.gap.location.profile import profiled
@@ -60,11 +60,11 @@ def _weighed(model: Model, location: Location) -> tuple[float, float]:
     old = location.problem
     level = highest_level(old.noise)
     problem = LinearProblem(model, old.measurement, old.noise, old.tunables, old.lines)
-    tuned = profiled(problem, (), location.tuned.z, iterations=PROFILE_STEPS // 2)
+    tuned = profiled(problem, (), location.tuned.z, share=0.0)
     plain = Left(along=0.0, along_expected=0.0, across=tuned.misfit, across_expected=tuned.expected, force=0.0)
     found = [(plain.log_likelihood(level) - tuned.prior / 2, plain.elsewhere(level))]
     for one in location.ranked[:PLACES] if len(problem.measured) > 1 else ():
-        beside = profiled(problem, (one.places[0].sites[0],), one.profile.z, iterations=PROFILE_STEPS // 2)
+        beside = profiled(problem, (one.places[0].sites[0],), one.profile.z, share=0.0)
         left = left_by_force(problem, tuned, beside)
         found.append((left.log_likelihood(level) - beside.prior / 2, left.elsewhere(level)))
     return max(found)

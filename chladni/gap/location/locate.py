@@ -13,11 +13,12 @@ from chladni.gap.calibration import (
     CYCLES_ASKED,
     FEWEST_SAMPLES,
     FORMS,
+    GAINED,
     LEADS,
     LESS,
+    LITTLE,
     LOCATED,
     PLACES,
-    PROFILE_STEPS,
     RIDGE,
     SEGMENTS,
 )
@@ -115,7 +116,7 @@ def locate(
         record = record.with_noise(noise_behind(record, ranked[0].profile))
         again = [(one.profile, one.places[0]) for one in ranked]
         ranked = _followed(record, _tied([one.profile.chi for one in ranked], again, FORMS))
-        plain = profiled(record, (), plain.z, iterations=PROFILE_STEPS // 2)
+        plain = profiled(record, (), plain.z)
     return Location(
         problem=record,
         tuned=plain,
@@ -152,7 +153,7 @@ def located_pairs(location: Location, rough: int = LOCATED) -> list[Located]:
     found = []
     for first, second in pairs:
         sites = (first.places[0].sites[0], second.sites[0])
-        profile = profiled(problem, sites, first.profile.z, iterations=PROFILE_STEPS // 4)
+        profile = profiled(problem, sites, first.profile.z, share=GAINED)
         found.append(Located(places=(first.places[0], second), profile=profile))
     return sorted(found, key=lambda one: one.profile.chi)
 
@@ -173,7 +174,7 @@ def _tuned_on_segments(model: Model, whole: LinearProblem, start: Real) -> tuple
 def tuned_stepwise(
     problems: Sequence[LinearProblem], z: Real, limit: float | Real | None = None, sites: Sequence[Site] = ()
 ) -> Profile:
-    """Fit the parameters on one problem after another, each starting where the one before ended.
+    """Fit the parameters on one problem after another, each starting where the one before ended, the last one finely.
 
     Parameters
     ----------
@@ -183,10 +184,9 @@ def tuned_stepwise(
         At which forces may be anything.
     """
     limit = problems[0].limits(z) if limit is None else limit
-    found = profiled(problems[0], sites, z, limit=limit)
-    for problem in problems[1:]:
-        found = profiled(problem, sites, found.z, limit=limit)
-    return found
+    for problem in problems[:-1]:
+        z = profiled(problem, sites, z, limit=limit, share=LITTLE).z
+    return profiled(problems[-1], sites, z, limit=limit)
 
 
 def lowest_hz(model: Model, measurement: Measurement) -> float:
@@ -220,18 +220,15 @@ def _worth_a_profile(problem: LinearProblem, plain: Profile, places: Sequence[Pl
 def _rough_profile(problems: Sequence[LinearProblem], plain: Profile, place: Place, start: Real) -> Profile:
     sites, z = (place.sites[0],), start
     for problem in problems[:-1]:
-        z = profiled(problem, sites, z, iterations=PROFILE_STEPS // 2).z
-    found = [profiled(problems[-1], sites, each, iterations=PROFILE_STEPS // 2) for each in (z, plain.z)]
+        z = profiled(problem, sites, z, share=LITTLE).z
+    found = [profiled(problems[-1], sites, each, share=LITTLE) for each in (z, plain.z)]
     return min(found, key=lambda one: one.cost)
 
 
 def _followed(record: LinearProblem, rough: Sequence[_Rough]) -> list[Located]:
     # With one sensor all patterns are one place: nothing is known of it but that it explains all.
     found = [
-        Located(
-            places=(place,), profile=profiled(record, (place.sites[0],), profile.z, iterations=PROFILE_STEPS // 2)
-        )
-        for profile, place in rough
+        Located(places=(place,), profile=profiled(record, (place.sites[0],), profile.z)) for profile, place in rough
     ]
     return sorted(found, key=lambda one: one.profile.chi)
 

@@ -166,29 +166,35 @@ def profiled(
     sites: Sequence[Site],
     start: Real,
     *,
-    iterations: int = PROFILE_STEPS,
     limit: float | Real | None = None,
+    share: float = SLIGHT,
 ) -> Profile:
     """Refit the parameters and the transient while forces at `sites` may be anything.
 
     Gauss and Newton steps within ``|z| <= limit`` on what is left (variable projection: Golub and Pereyra 1973),
-    shortened while they don't improve. By default parameters stay within their tolerances, but for those that start
-    outside, which may be wrong by anything.
+    shortened while they don't improve.
+
+    Parameters
+    ----------
+    limit
+        By default parameters stay within their tolerances, but for those that start outside, which may be wrong by
+        anything.
+    share
+        The first step that promises less of the misfit beyond noise is the last one: where much is left, a misfit's
+        last digits tell nothing, and each step takes about nine tenths of what could still be gained.
     """
     limit = problem.limits(start) if limit is None else limit
     best = _fitted(problem, sites, start)
-    for _ in range(iterations):
+    for _ in range(PROFILE_STEPS):
         here = best.profile
         ((step, promised),) = _steps(problem, best, (limit,))
-        if (
-            here.misfit + here.prior / 2 - promised - (here.z + step) @ (here.z + step) / 2
-            < SLIGHT * here.expected**0.5
-        ):
-            break
-        improved = _searched(problem, here, step)
+        gain = here.misfit + here.prior / 2 - promised - (here.z + step) @ (here.z + step) / 2
+        improved = _searched(problem, here, step) if gain >= SLIGHT * here.expected**0.5 else None
         if improved is None:
             break
         best = improved
+        if gain < share * (here.misfit - here.expected):
+            break
     return best.profile
 
 

@@ -45,7 +45,7 @@ def test_a_force_at_a_joint_is_found_there_and_nowhere_else(segments):
     """A hardening spring in one joint: the profile of that joint leaves noise, all others leave much more."""
     effect = attached("hardening_stiffness", "j2", {"cubic": 1e11})
     problem = problem_of(four_bodies().with_effects([effect]), segments=segments)
-    chi = [profiled(problem, (site,), np.zeros(12), iterations=4).chi for site in JOINTS]
+    chi = [profiled(problem, (site,), np.zeros(12)).chi for site in JOINTS]
     # Expected with a spread of 1/sqrt(3 x 1499).
     assert chi[2] == pytest.approx(NOISE_SHARE, abs=0.06)
     assert min(chi[:2] + chi[3:]) > 10
@@ -78,9 +78,9 @@ def test_parameters_off_by_one_and_a_half_sigma_are_found(sites):
     tunables = Tunables.of(model)
     z = 1.5 * np.where(np.random.default_rng(3).uniform(size=12) > 0.5, 1.0, -1.0)
     problem = problem_of(model.with_values(tunables.values(z)), segments=True)
-    start = profiled(problem, sites, np.zeros(12), iterations=8)
+    start = profiled(problem, sites, np.zeros(12))
     record = problem.on(lines_of(False))
-    found = profiled(record, sites, start.z, iterations=6)
+    found = profiled(record, sites, start.z)
     assert found.chi == pytest.approx(NOISE_SHARE, abs=0.06)
     assert profile_at(record, sites, np.zeros(12)).chi > 10
     slopes = record.slopes(found.z, found.transient, list(zip(found.sites, found.forces, strict=True)))
