@@ -18,6 +18,7 @@ from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.signals.arrays import Real
 
 Causes = frozenset[Candidate]
 
@@ -78,25 +79,30 @@ class Belief:
     def nats(self, one: Contestant) -> float:
         """Evidence and prior of one fit."""
         prior = self.value * len(one.hypothesis.freed) + self._words(one.hypothesis.effects)
-        return one.log_evidence - one.left.log_likelihood() + one.left.log_likelihood(self.level) + prior
+        return one.log_evidence - one.left.log_likelihood + one.left.at(self.level).log_likelihood + prior
 
     @cached_property
-    def level(self) -> float:
-        """Share of the floor that the noise has: what a fit leaves says so for all, as far as the floor allows."""
-        least = min(one.left.over_noise for one in self._contestants)
-        return min(least, highest_level(self._location.problem.noise))
+    def level(self) -> Real:
+        """``[output]`` share of the floor that the noise has: what the closest fit leaves, as far as that allows.
+
+        One share for all would put what one floor is too high by to the account of what others leave, but for
+        hypotheses of causes at as many places as there are sensors.
+        """
+        closest = min((one.left for one in self._contestants), key=lambda left: left.over_noise)
+        found = np.array(closest.outputs) if closest.outputs else closest.over_noise
+        return np.minimum(found, highest_level(self._location.problem.noise))
 
     def unexplained(self, one: Contestant) -> float:
         """Nats of what a fit leaves that neither noise nor usual details of its laws account for."""
-        return one.left.unexplained(self.level)
+        return one.left.at(self.level).unexplained
 
     def elsewhere(self, located: Located) -> float:
         """Nats of what a force at a place (or two) leaves."""
-        return self._left_by_force(located).elsewhere(self.level)
+        return self._left_by_force(located).at(self.level).elsewhere
 
     def beyond(self, one: Contestant) -> float:
         """Energy that a fit leaves beyond the noise."""
-        return one.left.beyond(self.level)
+        return one.left.at(self.level).beyond
 
     def _words(self, effects: Sequence[AttachedEffect]) -> float:
         """Nats of effects: each at a site of its own, or one word at several sites of a kind, as far as that is less.
@@ -124,7 +130,7 @@ class Belief:
             return -np.inf
         left = self._left_by_force(located)
         places = len(located.places)
-        return left.log_likelihood(self.level) - 0.5 * located.profile.prior + (self.site - DETAILS) * places
+        return left.at(self.level).log_likelihood - 0.5 * located.profile.prior + (self.site - DETAILS) * places
 
     def _left_by_force(self, located: Located) -> Left:
         tuned, found = self._of_horizon(self._location.tuned), self._of_horizon(located.profile)
@@ -177,7 +183,7 @@ class Belief:
             along=tuned.misfit, along_expected=tuned.expected, across=0.0, across_expected=0.0,
             force=np.inf, doubt=doubt_of(self._location.problem.noise), sites=self._sensors,
         )  # fmt: skip
-        return left.log_likelihood(self.level) - 0.5 * tuned.prior + (self.site - DETAILS) * self._sensors
+        return left.at(self.level).log_likelihood - 0.5 * tuned.prior + (self.site - DETAILS) * self._sensors
 
     @property
     def best(self) -> Contestant:

@@ -269,7 +269,7 @@ class Search:
         self.enter(self._relatives())
         for one in self._forms():
             # What details may bring is what is missing to noise alone.
-            if -one.left.log_likelihood(self.belief.level) > WORTH:
+            if -one.left.at(self.belief.level).log_likelihood > WORTH:
                 self.add(_polished(study, one))
         self.enter(twins(self.best, study.location.places))
 

@@ -31,7 +31,7 @@ def with_told_holds(model: Model, location: Location) -> Model:
     if not asked:
         return model
     tuned = location.tuned
-    if tuned.misfit <= highest_level(location.problem.noise) * tuned.expected:
+    if tuned.misfit <= np.mean(highest_level(location.problem.noise)) * tuned.expected:
         return model
     nats, _ = _weighed(model, location)
     for others in asked:
@@ -62,9 +62,9 @@ def _weighed(model: Model, location: Location) -> tuple[float, float]:
     problem = LinearProblem(model, old.measurement, old.noise, old.tunables, old.lines)
     tuned = profiled(problem, (), location.tuned.z, share=0.0)
     plain = Left(along=0.0, along_expected=0.0, across=tuned.misfit, across_expected=tuned.expected, force=0.0)
-    found = [(plain.log_likelihood(level) - tuned.prior / 2, plain.elsewhere(level))]
+    found = [(plain.at(level).log_likelihood - tuned.prior / 2, plain.at(level).elsewhere)]
     for one in location.ranked[:PLACES] if len(problem.measured) > 1 else ():
         beside = profiled(problem, (one.places[0].sites[0],), one.profile.z, share=0.0)
         left = left_by_force(problem, tuned, beside)
-        found.append((left.log_likelihood(level) - beside.prior / 2, left.elsewhere(level)))
+        found.append((left.at(level).log_likelihood - beside.prior / 2, left.at(level).elsewhere))
     return max(found)

@@ -98,7 +98,7 @@ class Contest:
             left=left,
             freedom=freedom,
             starts=starts,
-            log_evidence=left.log_likelihood() - 0.5 * fit.prior_cost + freedom - starts,
+            log_evidence=left.log_likelihood - 0.5 * fit.prior_cost + freedom - starts,
         )
 
     def _left(self, hypothesis: Hypothesis, fit: OutputErrorFit) -> Left:

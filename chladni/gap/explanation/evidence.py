@@ -1,9 +1,11 @@
 """Evidence: how probable a hypothesis makes a log; noise, details of its laws and its own freedom are allowed for."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chladni.gap.calibration import DETAILS, DOUBT, ELSEWHERE, OPEN, SIGMAS, SIZE, SLIP, UNUSUAL, USUAL, ZERO
 from chladni.gap.location.profile import Elimination, Profile
@@ -33,6 +35,10 @@ class Left:
         Share of the expected energy that the noise is uncertain by.
     sites
         Of laws with details: each differs from the machine's in its own way.
+    outputs
+        Energy of each output over what noise leaves there; empty where outputs aren't told apart.
+    along_outputs
+        Of `along_expected` each output's; empty where that's all alike.
     """
 
     along: float
@@ -42,6 +48,15 @@ class Left:
     force: float
     doubt: float = DOUBT
     sites: int = 1
+    outputs: tuple[float, ...] = ()
+    along_outputs: tuple[float, ...] = ()
+
+    def at(self, level: ArrayLike) -> Self:
+        """Give the same where the noise has another share of the floor, ``[output]`` or of all."""
+        own = np.array(self.along_outputs) if self.along_outputs else np.full(np.size(level), self.along_expected)
+        own = own * (self.along_expected / max(own.sum(), ZERO))
+        rest = (self.along_expected + self.across_expected) / own.size - own
+        return replace(self, along_expected=float(np.sum(level * own)), across_expected=float(np.sum(level * rest)))
 
     @property
     def over_noise(self) -> float:
@@ -54,45 +69,35 @@ class Left:
         beyond = max(self.along - self.along_expected, 0.0)
         return float(np.sqrt(beyond / max(self.force - self.along_expected, beyond, ZERO)))
 
-    def beyond(self, level: float = 1.0) -> float:
+    @property
+    def beyond(self) -> float:
         """Energy beyond the noise."""
-        return sum(
-            max(energy - level * expected, 0.0)
-            for energy, expected in ((self.along, self.along_expected), (self.across, self.across_expected))
-        )
+        return max(self.along - self.along_expected, 0.0) + max(self.across - self.across_expected, 0.0)
 
-    def elsewhere(self, level: float = 1.0) -> float:
-        """Nats of what no force at the sites could print, whatever the floor may be wrong by.
-
-        Parameters
-        ----------
-        level
-            Share of the floor that the noise has.
-        """
-        noise = level * self.across_expected
+    @property
+    def elsewhere(self) -> float:
+        """Nats of what no force at the sites could print, whatever the floor may be wrong by."""
+        noise = self.across_expected
         return _student(_beyond_doubt(self.across - noise, self.doubt * noise), ELSEWHERE)
 
-    def unexplained(self, level: float = 1.0) -> float:
+    @property
+    def unexplained(self) -> float:
         """Nats of what neither noise, wrong as the floor may be, nor usual details of the laws account for."""
-        noise = level * self.along_expected
+        noise = self.along_expected
         # Where no force without the laws is known, of windows, no detail is usual.
         usual = self._usual(OPEN) if np.isfinite(self.force) else 0.0
         surplus = _beyond_doubt(self.along - noise - usual, self.doubt * noise)
-        return self.elsewhere(level) + _student(surplus, UNUSUAL, usual)
+        return self.elsewhere + _student(surplus, UNUSUAL, usual)
 
-    def log_likelihood(self, level: float = 1.0) -> float:
+    @property
+    def log_likelihood(self) -> float:
         """Nats, but for what all hypotheses share.
 
         Of noise alone it's the misfit. What goes beyond that by D independent numbers of unknown size is
         ``-D ln(1 + misfit/D)`` (Student's distribution: a Gaussian discrepancy whose scale is integrated out): few
         numbers for usual details of the laws, more for what they leave of their force beyond, most for all else.
-
-        Parameters
-        ----------
-        level
-            Share of the floor that the noise has.
         """
-        across, along = level * self.across_expected, level * self.along_expected
+        across, along = self.across_expected, self.along_expected
         usual = self._usual(USUAL)
         details = _told(min(self.along - along, usual), self.doubt * along)
         unusual = _told(self.along - along - usual, self.doubt * along)
@@ -130,9 +135,9 @@ def _beyond_doubt(beyond: float, doubted: float) -> float:
     return beyond**2 / (beyond + 2.0 * doubted**2) if beyond > 0 else 0.0
 
 
-def highest_level(noise: NoiseFloor) -> float:
-    """Share of a floor that the noise has at most: two doubts more."""
-    return 1.0 + SIGMAS * doubt_of(noise)
+def highest_level(noise: NoiseFloor) -> Real:
+    """``[output]`` share of a floor that the noise has at most: two doubts more."""
+    return np.asarray(1.0 + SIGMAS * (2.0 * noise.std + DOUBT), dtype=np.float64)
 
 
 def doubt_of(noise: NoiseFloor) -> float:
@@ -156,8 +161,8 @@ def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed:
     view, plain = (problem.beside(fit.z, run.compiled(fit.z, effects)) for effects in (linear, ()))
     residual = lines.spectrum(measurement.outputs - fit.outputs) * weight
     missing = np.asarray((problem.measured - plain.forced()) * weight, dtype=np.complex128)
-    along, across = _split(view, measurement.output_names, detailed, weight, residual)
-    force, _ = _split(plain, measurement.output_names, detailed, weight, missing)
+    along, across, share = _split(view, measurement.output_names, detailed, weight, residual)
+    force, _, _ = _split(plain, measurement.output_names, detailed, weight, missing)
     count, sensors, sites = lines.index.size, len(measurement.output_names), min(len(set(detailed)), len(residual))
     return Left(
         along=along,
@@ -167,6 +172,8 @@ def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed:
         force=force,
         doubt=doubt_of(problem.noise),
         sites=len(set(detailed)),
+        outputs=tuple((np.sum(np.abs(residual) ** 2, axis=(1, 2)) / count).tolist()),
+        along_outputs=tuple(share.tolist()),
     )
 
 
@@ -182,17 +189,20 @@ def left_by_force(problem: LinearProblem, tuned: Profile, found: Profile) -> Lef
         force=np.inf,
         doubt=doubt_of(problem.noise),
         sites=len(found.sites),
+        along_outputs=found.taken,
     )
 
 
 def _split(
     view: View, outputs: Sequence[str], names: Sequence[str], weight: Real, residual: Complex
-) -> tuple[float, float]:
+) -> tuple[float, float, Real]:
+    """Energy along the forces at some sites, and the rest; ``[output]`` of noise that goes along."""
     sites = [site for site in sites_of(view.compiled, outputs) if site.name in names]
     patterns = [view.pattern(way_to(view, site, outputs))[:, None] * weight for site in sites]
     transients = view.transients()[:, :, None] * weight
-    whole, across = (float(np.sum(Elimination(some, transients).rest(residual) ** 2)) for some in ([], patterns))
-    return whole - across, across
+    plain, along = (Elimination(some, transients) for some in ([], patterns))
+    whole, across = (float(np.sum(one.rest(residual) ** 2)) for one in (plain, along))
+    return whole - across, across, along.share * np.ones(len(outputs))
 
 
 def freedom_nats(

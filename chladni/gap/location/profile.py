@@ -35,6 +35,8 @@ class Profile:
         That number.
     prior
         ``z'z``.
+    taken
+        Of each output the energy of its noise that the forces take; empty without any.
     """
 
     sites: tuple[Site, ...]
@@ -44,6 +46,7 @@ class Profile:
     misfit: float
     expected: float
     prior: float
+    taken: tuple[float, ...] = ()
 
     @property
     def chi(self) -> float:
@@ -67,6 +70,11 @@ class Projection:
 
     def __init__(self, patterns: Sequence[Complex]) -> None:
         self._unit = _orthonormal(patterns)
+
+    @property
+    def share(self) -> Real:
+        """``[output]``: of noise of one on each output and line, the energy that forces take."""
+        return np.asarray(sum(np.sum(np.abs(known[:, 0]) ** 2, axis=-1) for known in self._unit), dtype=np.float64)
 
     def away(self, spectra: Complex) -> Complex:
         """Take the forces from ``[..., output, segment, line]``."""
@@ -271,6 +279,7 @@ def _fitted(problem: LinearProblem, sites: Sequence[Site], z: Real) -> _Fit:
         misfit=float(np.sum(out.rest(residual) ** 2)),
         expected=float(max(outputs - len(sites), 0) * np.prod(others)) or 1.0,
         prior=float(z @ z),
+        taken=tuple(np.atleast_1d(out.share).tolist()) if len(sites) else (),
     )
     return _Fit(profile=profile, out=out, residual=residual)
 

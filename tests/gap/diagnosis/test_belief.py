@@ -40,7 +40,7 @@ def place(misfit: float, *, places: int = 1, sensors: int = 3):
     expected = (sensors - places) * LINES
     sites = tuple(Site(name=f"j{one}", kind="joint") for one in range(places))
     profile = SimpleNamespace(
-        misfit=misfit * expected, expected=expected, prior=0.0, forces=(None,) * places, sites=sites
+        misfit=misfit * expected, expected=expected, prior=0.0, taken=(), forces=(None,) * places, sites=sites
     )
     return SimpleNamespace(profile=profile, places=tuple(Place(sites=(one,)) for one in sites))
 
@@ -105,11 +105,11 @@ def test_what_leaves_less_than_the_floor_says_for_all_that_noise_is_less() -> No
         contestant(LAG, left=low(0.25)),
         contestant(DELAY, left=low(0.5)),
     )
-    found = [replace(one, log_evidence=one.left.log_likelihood()) for one in (nothing, best, worse)]
+    found = [replace(one, log_evidence=one.left.log_likelihood) for one in (nothing, best, worse)]
     assert [one.log_evidence for one in found] == [0.0, 0.0, 0.0]
     belief = Belief(location(), found)
     assert belief.level == pytest.approx(0.25)
-    assert belief.nats(found[1]) - belief.nats(found[2]) == pytest.approx(-low(0.5).log_likelihood(0.25))
+    assert belief.nats(found[1]) - belief.nats(found[2]) == pytest.approx(-low(0.5).at(0.25).log_likelihood)
     assert belief.best is found[1]
 
 
@@ -126,7 +126,7 @@ def test_a_cause_without_which_as_little_is_left_is_none() -> None:
     more = contestant(LAG, RUB, left=leaving(1.0 + 1e-6), log_evidence=1e3)
     belief = Belief(location(), [nothing, lag, more])
     # Of a gap of 49 times the noise the second explains one: 2 % and a little.
-    assert belief.least == pytest.approx(SHARE * nothing.left.beyond())
+    assert belief.least == pytest.approx(SHARE * nothing.left.beyond)
     assert {len(one.causes) for one in belief.sets} == {0, 1, 2}
 
 
@@ -188,11 +188,11 @@ def test_a_group_is_as_probable_as_all_sets_with_any_of_it() -> None:
 def test_a_force_of_any_shape_is_believed_where_no_law_explains_what_it_does() -> None:
     # A gap of a hundred times the noise, of which the word leaves a tenth and a force at one place nothing.
     where, nothing = location([place(1.0)], misfit=100.0), contestant(left=leaving(100.0))
-    nothing = replace(nothing, log_evidence=nothing.left.log_likelihood())
+    nothing = replace(nothing, log_evidence=nothing.left.log_likelihood)
 
     def unknown(chi: float) -> float:
         word = contestant(RUB, left=leaving(chi))
-        return Belief(where, [nothing, replace(word, log_evidence=word.left.log_likelihood())]).unknown
+        return Belief(where, [nothing, replace(word, log_evidence=word.left.log_likelihood)]).unknown
 
     assert unknown(1.0) < 0.05
     assert unknown(10.0) > 0.95
@@ -221,7 +221,7 @@ def test_an_unknown_force_pays_for_each_place_and_for_its_numbers_there(chi: flo
 
 def test_where_a_sensor_is_told_to_err_nothing_unknown_acts() -> None:
     where, left = location([place(1.0)], misfit=100.0), leaving(100.0)
-    fit = contestant(left=left, log_evidence=left.log_likelihood())
+    fit = contestant(left=left, log_evidence=left.log_likelihood)
     for told_to_err, site in (((), "j0"), (("j1",), "j0"), (("j0",), "")):
         assert Belief(where, [fit], told=told_to_err).answer_set(0.9) == (Candidate(effect="unknown", site=site),)
 
@@ -261,7 +261,7 @@ def test_a_name_is_given_when_it_is_more_probable_than_not(shares, verdict) -> N
 
 def test_nothing_is_no_answer_where_an_unknown_force_is_likelier() -> None:
     tuned = contestant(left=leaving(3.0))
-    belief = Belief(location([place(1.0)], misfit=3.0), [replace(tuned, log_evidence=tuned.left.log_likelihood())])
+    belief = Belief(location([place(1.0)], misfit=3.0), [replace(tuned, log_evidence=tuned.left.log_likelihood)])
     assert belief.unknown > 0.9
     assert _verdict(belief) == "unknown"
 
@@ -275,15 +275,15 @@ def is_open(best, nothing) -> bool:
 
 def test_a_further_cause_is_looked_for_where_it_may_be_worth_its_price_and_a_name() -> None:
     gap = leaving(1000.0)
-    beyond = gap.beyond() / (2 * LINES)
+    beyond = gap.beyond / (2 * LINES)
     assert is_open(leaving(900.0), gap)
     assert not is_open(leaving(1.0), gap)
     # Less than a name pays, however large its share is.
-    assert leaving(1.01).unexplained() < WORTH
+    assert leaving(1.01).unexplained < WORTH
     assert not is_open(leaving(1.01), leaving(1.02))
     # Far more than noise, and a share that is what a model is rounded by.
     rounded = leaving(1.0 + 0.5 * SHARE * beyond)
-    assert rounded.unexplained() > WORTH
+    assert rounded.unexplained > WORTH
     assert not is_open(rounded, gap)
     assert is_open(leaving(1.0 + 2.0 * SHARE * beyond), gap)
 

@@ -41,45 +41,45 @@ def discrepancy(energy: float, numbers: float) -> float:
 
 
 def test_noise_alone_is_the_zero_of_the_scale() -> None:
-    assert NOISE.log_likelihood() == 0.0
+    assert NOISE.log_likelihood == 0.0
     assert NOISE.over_noise == 1.0
-    assert NOISE.unexplained() == NOISE.beyond() == NOISE.details == 0.0
+    assert NOISE.unexplained == NOISE.beyond == NOISE.details == 0.0
 
 
 @pytest.mark.parametrize("energy", [0.01, 3.0, 50.0, 4e3])
 def test_what_is_beyond_noise_is_a_gaussian_discrepancy_whose_scale_is_integrated_out(energy: float) -> None:
     across = replace(NOISE, across=NOISE.across + energy)
     along = replace(NOISE, along=NOISE.along + energy)
-    assert across.log_likelihood() == pytest.approx(discrepancy(energy, ELSEWHERE), rel=1e-6)
-    assert along.log_likelihood() == pytest.approx(discrepancy(energy, DETAILS), rel=1e-6)
+    assert across.log_likelihood == pytest.approx(discrepancy(energy, ELSEWHERE), rel=1e-6)
+    assert along.log_likelihood == pytest.approx(discrepancy(energy, DETAILS), rel=1e-6)
     # A law's own details are forgiven, what no force at its site could print isn't.
-    assert along.log_likelihood() > across.log_likelihood()
-    assert across.beyond() == along.beyond() == pytest.approx(energy)
+    assert along.log_likelihood > across.log_likelihood
+    assert across.beyond == along.beyond == pytest.approx(energy)
 
 
 def test_a_little_more_than_noise_is_its_misfit() -> None:
-    assert replace(NOISE, across=NOISE.across + 1e-3).log_likelihood() == pytest.approx(-1e-3, rel=1e-4)
+    assert replace(NOISE, across=NOISE.across + 1e-3).log_likelihood == pytest.approx(-1e-3, rel=1e-4)
 
 
 def test_both_parts_add() -> None:
     more = replace(NOISE, along=NOISE.along + 40.0, across=NOISE.across + 70.0)
-    assert more.log_likelihood() == pytest.approx(discrepancy(40.0, DETAILS) + discrepancy(70.0, ELSEWHERE), rel=1e-6)
+    assert more.log_likelihood == pytest.approx(discrepancy(40.0, DETAILS) + discrepancy(70.0, ELSEWHERE), rel=1e-6)
 
 
 def test_a_lower_noise_is_what_energy_is_beyond_of() -> None:
     half = replace(NOISE, along=150.0, across=450.0)
-    assert half.log_likelihood() == half.log_likelihood(0.5) == 0.0
-    assert half.log_likelihood(1 / 3) == pytest.approx(
+    assert half.log_likelihood == half.at(0.5).log_likelihood == 0.0
+    assert half.at(1 / 3).log_likelihood == pytest.approx(
         discrepancy(50.0, DETAILS) + discrepancy(150.0, ELSEWHERE), rel=1e-6
     )
-    assert half.beyond(1 / 3) == pytest.approx(200.0)
+    assert half.at(1 / 3).beyond == pytest.approx(200.0)
 
 
 def test_what_a_floor_is_uncertain_by_says_little_and_far_more_says_all() -> None:
     unsure = replace(NOISE, doubt=0.1)
     little, much = (replace(unsure, across=unsure.across + more) for more in (3.0, 3e5))
-    assert little.log_likelihood() == pytest.approx(-3.0 * 3.0 / (3.0 + 90.0), rel=0.01)
-    assert much.log_likelihood() == pytest.approx(discrepancy(3e5 - 90.0, ELSEWHERE), rel=1e-3)
+    assert little.log_likelihood == pytest.approx(-3.0 * 3.0 / (3.0 + 90.0), rel=0.01)
+    assert much.log_likelihood == pytest.approx(discrepancy(3e5 - 90.0, ELSEWHERE), rel=1e-3)
     quarter = white_floor([1.0, 1.0])
     assert doubt_of(replace(quarter, std=np.array([0.02, 0.25]))) == pytest.approx(0.55)
 
@@ -88,20 +88,20 @@ def test_details_are_a_share_of_the_law_s_own_force() -> None:
     tenth = replace(NOISE, along=NOISE.along + 0.01 * (NOISE.force - NOISE.along_expected))
     assert tenth.details == pytest.approx(0.1)
     # A right law leaves a tenth: nothing that another cause would be looked for.
-    assert tenth.unexplained() == pytest.approx(0.0, abs=1.0)
+    assert tenth.unexplained == pytest.approx(0.0, abs=1.0)
     half = replace(NOISE, along=NOISE.along + 0.25 * NOISE.force)
-    assert half.unexplained() > 30.0
+    assert half.unexplained > 30.0
     # Elsewhere no details of a law excuse anything.
-    assert replace(NOISE, across=NOISE.across + 0.01 * NOISE.force).unexplained() > 100.0
+    assert replace(NOISE, across=NOISE.across + 0.01 * NOISE.force).unexplained > 100.0
     # Of a force of any shape nothing is unusual.
     anything = replace(half, force=np.inf)
-    assert anything.log_likelihood() == pytest.approx(discrepancy(0.25 * NOISE.force, DETAILS), rel=1e-6)
-    assert half.log_likelihood() < anything.log_likelihood() - 20.0
+    assert anything.log_likelihood == pytest.approx(discrepancy(0.25 * NOISE.force, DETAILS), rel=1e-6)
+    assert half.log_likelihood < anything.log_likelihood - 20.0
 
 
 def test_each_law_differs_from_the_machine_s_in_its_own_way() -> None:
     more = replace(NOISE, along=NOISE.along + 200.0)
-    assert replace(more, sites=2).log_likelihood() == pytest.approx(discrepancy(200.0, 2 * DETAILS), rel=1e-6)
+    assert replace(more, sites=2).log_likelihood == pytest.approx(discrepancy(200.0, 2 * DETAILS), rel=1e-6)
 
 
 @pytest.fixture(scope="module")
