@@ -113,6 +113,24 @@ def test_what_leaves_less_than_the_floor_says_for_all_that_noise_is_less() -> No
     assert belief.best is found[1]
 
 
+def test_a_cause_that_does_nothing_is_none_where_one_floor_is_too_high() -> None:
+    # Both leave noise alone: half of the first sensor's floor, all of the others'. The idle one prints on the second.
+    alone = Left(
+        along=150.0, along_expected=300.0, across=600.0, across_expected=600.0, force=1e7,
+        outputs=(0.5, 1.0, 1.0), along_outputs=(300.0, 0.0, 0.0),
+    )  # fmt: skip
+    beside = replace(
+        alone, along=450.0, along_expected=600.0, across=300.0, across_expected=300.0, sites=2,
+        along_outputs=(300.0, 300.0, 0.0),
+    )  # fmt: skip
+    nothing = contestant(left=replace(alone, across=6e5, outputs=(500.0,) * 3))
+    found = [nothing, contestant(LAG, left=alone), contestant(LAG, RUB, left=beside)]
+    belief = Belief(location(), [replace(one, log_evidence=one.left.log_likelihood) for one in found])
+    assert belief.level == pytest.approx((0.5, 1.0, 1.0))
+    assert belief.beyond(found[1]) == belief.beyond(found[2]) == 0.0
+    assert {one.effect for one in belief.sets[0].causes} == {LAG.kind.name}
+
+
 def test_a_fit_tells_the_noise_as_far_as_the_floor_allows_and_else_the_floor_does() -> None:
     most = 1.0 + 2.0 * DOUBT
     assert Belief(location(), [contestant(left=leaving_all(most - 0.01))]).level == pytest.approx(most - 0.01)

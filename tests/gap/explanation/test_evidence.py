@@ -75,6 +75,21 @@ def test_a_lower_noise_is_what_energy_is_beyond_of() -> None:
     assert half.at(1 / 3).beyond == pytest.approx(200.0)
 
 
+def test_a_floor_that_is_too_high_on_one_output_hides_nothing_and_accuses_nobody() -> None:
+    # A force at a site prints on the first of two sensors alone, whose noise has half of its floor.
+    one = Left(
+        along=150.0, along_expected=300.0, across=300.0, across_expected=300.0, force=1e7, doubt=0.0,
+        outputs=(0.5, 1.0), along_outputs=(300.0, 0.0),
+    )  # fmt: skip
+    assert one.at(one.outputs).beyond == 0.0
+    assert one.at(one.outputs).log_likelihood == 0.0
+    # One share for both would miss a quarter of the second's.
+    assert one.at(0.75).beyond == pytest.approx(75.0)
+    # Where forces at as many sites print as there are sensors, both are the same.
+    two = replace(one, along=450.0, along_expected=600.0, across=0.0, across_expected=0.0, along_outputs=(300.0,) * 2)
+    assert two.at(one.outputs).beyond == two.at(0.75).beyond == 0.0
+
+
 def test_what_a_floor_is_uncertain_by_says_little_and_far_more_says_all() -> None:
     unsure = replace(NOISE, doubt=0.1)
     little, much = (replace(unsure, across=unsure.across + more) for more in (3.0, 3e5))
