@@ -73,6 +73,7 @@ class Belief:
         self._contestants, self._sensors = tuple(contestants), len(problem.measured)
         alone = [one.left.along + one.left.across for one in contestants if not one.hypothesis.effects]
         self._horizon = min(alone) / location.tuned.misfit if windows and location.tuned.misfit else 1.0
+        self._told = np.isin(problem.measurement.output_names, list(told))
         places = [*location.ranked, *([] if pair is None else [pair])]
         self._places = [one for one in places if all(set(told).isdisjoint(each.names) for each in one.places)]
 
@@ -90,7 +91,9 @@ class Belief:
         """
         closest = min((one.left for one in self._contestants), key=lambda left: left.over_noise)
         found = np.array(closest.outputs) if closest.outputs else closest.over_noise
-        return np.minimum(found, highest_level(self._location.problem.noise))
+        # What a coarse sensor rounds off follows its signal: there the noise is whatever is left.
+        highest = np.where(self._told, np.inf, highest_level(self._location.problem.noise))
+        return np.minimum(found, highest)
 
     def unexplained(self, one: Contestant) -> float:
         """Nats of what a fit leaves that neither noise nor usual details of its laws account for."""
