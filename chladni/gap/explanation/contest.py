@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chladni.gap.calibration import BLOCK_S, EFFECTIVE_SAMPLES, FAR, FEWEST, ITERATIONS, THIRDS
+from chladni.gap.calibration import BLOCK_S, EFFECTIVE_SAMPLES, FEWEST, ITERATIONS, THIRDS
 from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.evidence import Left, doubt_of, freedom_nats, left_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
@@ -117,18 +117,12 @@ class Contest:
         )  # fmt: skip
 
     def with_spread(self, found: Contestant) -> Contestant:
-        """Give a contestant fitted finely, with the standard deviations that the colour of its residual allows."""
-        tune, offsets = bool(np.any(found.fit.parameter_std)), len(self.run.windows) == 1
-        fitted, freed, fit = found.hypothesis.fitted or None, found.hypothesis.freed, found.fit
+        """Give a contestant with the standard deviations that the colour of its residual allows."""
         try:
-            if np.max(fit.misfit_by_output) > FAR:
-                fit = fit_output_error(
-                    self.run, self.noise, effects=fit.effects, fitted=fitted, training=self.training,
-                    start_z=fit.z, start_initial=fit.initial, freed=freed, tune=tune, offsets=offsets, finely=True,
-                )  # fmt: skip
             fit = with_coloured_spread(
-                self.run, self.noise, fit,
-                fitted=fitted, training=self.training, freed=freed, tune=tune, offsets=offsets,
+                self.run, self.noise, found.fit,
+                fitted=found.hypothesis.fitted or None, training=self.training, freed=found.hypothesis.freed,
+                tune=bool(np.any(found.fit.parameter_std)), offsets=len(self.run.windows) == 1,
             )  # fmt: skip
         except (ModelError, EstimateError, np.linalg.LinAlgError):
             return found

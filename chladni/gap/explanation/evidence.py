@@ -161,8 +161,8 @@ def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed:
     view, plain = (problem.beside(fit.z, run.compiled(fit.z, effects)) for effects in (linear, ()))
     residual = lines.spectrum(measurement.outputs - fit.outputs) * weight
     missing = np.asarray((problem.measured - plain.forced()) * weight, dtype=np.complex128)
-    along, across, share = _split(view, measurement.output_names, detailed, weight, residual)
-    force, _, _ = _split(plain, measurement.output_names, detailed, weight, missing)
+    (along, across), out = _split(view, measurement.output_names, detailed, weight, residual)
+    (force, _), _ = _split(plain, measurement.output_names, detailed, weight, missing)
     count, sensors, sites = lines.index.size, len(measurement.output_names), min(len(set(detailed)), len(residual))
     return Left(
         along=along,
@@ -173,7 +173,7 @@ def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed:
         doubt=doubt_of(problem.noise),
         sites=len(set(detailed)),
         outputs=tuple((np.sum(np.abs(residual) ** 2, axis=(1, 2)) / count).tolist()),
-        along_outputs=tuple(share.tolist()),
+        along_outputs=out.taken,
     )
 
 
@@ -195,14 +195,14 @@ def left_by_force(problem: LinearProblem, tuned: Profile, found: Profile) -> Lef
 
 def _split(
     view: View, outputs: Sequence[str], names: Sequence[str], weight: Real, residual: Complex
-) -> tuple[float, float, Real]:
-    """Energy along the forces at some sites, and the rest; ``[output]`` of noise that goes along."""
+) -> tuple[tuple[float, float], Elimination]:
+    """Energy along the forces at some sites, and the rest; what takes them."""
     sites = [site for site in sites_of(view.compiled, outputs) if site.name in names]
     patterns = [view.pattern(way_to(view, site, outputs))[:, None] * weight for site in sites]
     transients = view.transients()[:, :, None] * weight
-    plain, along = (Elimination(some, transients) for some in ([], patterns))
-    whole, across = (float(np.sum(one.rest(residual) ** 2)) for one in (plain, along))
-    return whole - across, across, along.share * np.ones(len(outputs))
+    plain, out = (Elimination(some, transients) for some in ([], patterns))
+    whole, across = (float(np.sum(one.rest(residual) ** 2)) for one in (plain, out))
+    return (whole - across, across), out
 
 
 def freedom_nats(

@@ -72,9 +72,12 @@ class Projection:
         self._unit = _orthonormal(patterns)
 
     @property
-    def share(self) -> Real:
-        """``[output]``: of noise of one on each output and line, the energy that forces take."""
-        return np.asarray(sum(np.sum(np.abs(known[:, 0]) ** 2, axis=-1) for known in self._unit), dtype=np.float64)
+    def taken(self) -> tuple[float, ...]:
+        """Of each output the energy of its noise that the forces take; empty without any."""
+        if not self._unit:
+            return ()
+        found: list[float] = np.sum(np.abs(np.array(self._unit)[:, :, 0]) ** 2, axis=(0, 2)).tolist()
+        return tuple(found)
 
     def away(self, spectra: Complex) -> Complex:
         """Take the forces from ``[..., output, segment, line]``."""
@@ -279,7 +282,7 @@ def _fitted(problem: LinearProblem, sites: Sequence[Site], z: Real) -> _Fit:
         misfit=float(np.sum(out.rest(residual) ** 2)),
         expected=float(max(outputs - len(sites), 0) * np.prod(others)) or 1.0,
         prior=float(z @ z),
-        taken=tuple(np.atleast_1d(out.share).tolist()) if len(sites) else (),
+        taken=out.taken,
     )
     return _Fit(profile=profile, out=out, residual=residual)
 

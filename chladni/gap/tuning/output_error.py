@@ -6,18 +6,7 @@ from typing import TypedDict
 
 import numpy as np
 
-from chladni.gap.calibration import (
-    DAMPINGS,
-    FAR,
-    GAINED,
-    ITERATIONS,
-    LITTLE,
-    LONGEST,
-    PRECISION,
-    RIDGE,
-    SLIGHT,
-    ZERO,
-)
+from chladni.gap.calibration import DAMPINGS, GAINED, ITERATIONS, LITTLE, LONGEST, PRECISION, RIDGE, ZERO
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.bounded_step import bounded_step
@@ -116,7 +105,6 @@ def fit_output_error(
     offsets: bool = True,
     max_iterations: int = ITERATIONS,
     precision: float = PRECISION,
-    finely: bool = False,
 ) -> OutputErrorFit:
     """Fit parameters, effects and initial states to a log.
 
@@ -152,9 +140,6 @@ def fit_output_error(
         Of the fit.
     precision
         Nats; a step that promises less ends the fit.
-    finely
-        Whether it does so where much more than noise is left, too, which decides between no two hypotheses; such a
-        fit begins where another one ended.
 
     Raises
     ------
@@ -175,8 +160,7 @@ def fit_output_error(
     start = problem.start_of_windows() if problem.has_laws and len(run.windows) > 1 else problem.start()
     if start_initial is not None:
         start = Point(start.x, np.array(start_initial, dtype=np.float64).reshape(start.initial.shape))
-    problem.coarse &= not finely
-    here, slopes, converged, iterations = _fit(problem, start, max_iterations, precision, 0.0 if finely else SLIGHT)
+    here, slopes, converged, iterations = _fit(problem, start, max_iterations, precision)
     return _report(problem, here, slopes, converged=converged, iterations=iterations)
 
 
@@ -228,29 +212,25 @@ def _whitening(run: FreeRun, noise: NoiseFloor, training: Mask, offsets: bool) -
     return Whitening(seen, training, offsets=offsets)
 
 
-def _fit(
-    problem: FitProblem, start: Point, most: int, precision: float, share: float
-) -> tuple[Evaluation, Slopes, bool, int]:
+def _fit(problem: FitProblem, start: Point, most: int, precision: float) -> tuple[Evaluation, Slopes, bool, int]:
     """Coarsely first where that is quicker, then as finely as runs are made."""
     spent = 0
     if problem.coarse:
         # What a coarse run is wrong by is no reason to follow it further than this.
         enough = GAINED * problem.whitening.samples * problem.run.rows.size
         try:
-            found, _, _, spent = _descend(problem, problem.evaluate(start), most, enough, share)
+            found, _, _, spent = _descend(problem, problem.evaluate(start), most, enough)
             start = found.point
         except (ModelError, EstimateError):
             spent = 0
         problem.coarse = False
     here, slopes, converged, more = _descend(
-        problem, problem.evaluate(start), max(most - spent, min(most, ITERATIONS // 3)), precision, share
+        problem, problem.evaluate(start), max(most - spent, min(most, ITERATIONS // 3)), precision
     )
     return here, slopes, converged, spent + more
 
 
-def _descend(
-    problem: FitProblem, here: Evaluation, most: int, enough: float, share: float
-) -> tuple[Evaluation, Slopes, bool, int]:
+def _descend(problem: FitProblem, here: Evaluation, most: int, enough: float) -> tuple[Evaluation, Slopes, bool, int]:
     level, iterations = 0, 0
     slopes = problem.slopes(here)
     while iterations < most:
@@ -260,7 +240,7 @@ def _descend(
         if found is None and not problem.stale:
             return here, slopes, promised < enough, iterations
         gained, here = (0.0, here) if found is None else (here.cost - found.cost, found)
-        done = found is None or max(promised, gained) < max(enough, share * _beyond(problem, here))
+        done = found is None or max(promised, gained) < enough
         if done and not problem.stale:
             return here, slopes, True, iterations
         try:
@@ -268,12 +248,6 @@ def _descend(
         except EstimateError:
             return here, slopes, False, iterations
     return here, slopes, False, iterations
-
-
-def _beyond(problem: FitProblem, here: Evaluation) -> float:
-    """Nats for each share of the misfit that goes, of outputs that are missed by far more than noise."""
-    missed = 1.0 - FAR / np.maximum(here.residual.power, FAR)
-    return float(0.5 * problem.whitening.samples * np.sum(missed))
 
 
 def _search(

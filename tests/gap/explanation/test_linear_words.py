@@ -1,4 +1,4 @@
-"""Linear effects that the screen loses are found beside the parameters."""
+"""Linear effects are found beside the parameters, which move resonances as they do."""
 
 import pytest
 
@@ -27,18 +27,17 @@ def loaded(word: str, site: str, values: dict[str, float], outputs: tuple[str, .
 
 @pytest.mark.nightly
 @pytest.mark.parametrize(("word", "site", "values", "outputs"), LOADS)
-def test_a_heavy_load_is_found_where_the_screen_loses_it(
+def test_a_heavy_load_is_found_beside_the_parameters(
     word: str, site: str, values: dict[str, float], outputs: tuple[str, ...]
 ) -> None:
     log = loaded(word, site, values, outputs)
     location = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
     candidates = screened(location, location.ranked, WORDS)
-    own = [one for one in candidates if (one.trial.effect, one.trial.site.name) == (word, site)]
-    assert min(one.chi for one in own) > 100.0
     found = linear_hypotheses(arm(), location, candidates)
     best = next(one for one in found if one.effects[0].effect == word)
-    # Noise of 0.3 % beside as much that a floor grants to any law leaves less than the floor.
-    assert 0.5 < best.screened < 1.1
+    # Noise of 0.3 % beside as much that a floor grants to any law is half of the floor, less what ten numbers take of
+    # 1500 lines: 0.497, with a spread of 0.013 for one sensor.
+    assert 0.45 < best.screened < 1.1
     assert best.effects[0].site == site
     # Parameters of the machine are off, by three per cent each: masses are known no better.
     assert best.effects[0].values["mass"] == pytest.approx(values["mass"], rel=0.05)
