@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from chladni.gap.calibration import CLOSE, COVERAGE, DETAILS, LAPSE, LEAST_SHARE, NAMED, TEMPER
+from chladni.gap.calibration import CLOSE, COVERAGE, LAPSE, LEAST_SHARE, NAMED, TEMPER
 from chladni.gap.comparison.shares import band_shares, regime_shares, relative_residual
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.records.diagnosis import (
@@ -39,6 +39,9 @@ from chladni.gap.robots.trial import Confirmed, Trial
 from chladni.gap.robots.tuned import tuned_parameters
 from chladni.robots.dynamics import inertial_numbers
 from chladni.signals.arrays import Mask, Real
+
+if TYPE_CHECKING:
+    from chladni.gap.robots.rival import Rival
 
 #: Others that are weighed in place of each cause, and blocks of the log of which every other one judges.
 _OTHERS, _BLOCKS = 6, 16
@@ -205,30 +208,6 @@ class Answer:
             answer_set=tuple(dict.fromkeys(each for one in self.weighed for each in (one.candidate, *one.others))),
             coverage=COVERAGE,
         )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rival:
-    """An answer that could stand in another one's place, and the nats by which it's behind."""
-
-    answer: Answer
-    behind: float
-
-
-def likelier(one: Answer, other: Answer) -> tuple[Answer, Rival | None]:
-    """Give the likelier answer of two first, and the other where it could stand in its place, for it's confirmed.
-
-    Both are weighed by their torques at the second one's noise, and by the error that their simulations leave, as
-    details of the named laws.
-    """
-    of_one, of_other = one.simulated, other.simulated
-    if of_one is None or of_other is None or not other.is_confirmed():
-        return one, None
-    torques = other.solved.best.nats - other.solved.contest.nats_of(one.solved.best.terms)
-    ahead = torques + 2.0 * DETAILS * float(np.log(of_one.after / of_other.after))
-    if ahead <= 0:
-        return one, Rival(answer=other, behind=-ahead)
-    return other, Rival(answer=one, behind=ahead) if one.named else None
 
 
 def _without_worst(named: tuple["Weighed", ...], found: Confirmed) -> tuple["Weighed", ...]:

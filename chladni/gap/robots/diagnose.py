@@ -3,8 +3,9 @@
 from collections.abc import Callable
 
 from chladni.gap.records.diagnosis import Diagnosis
-from chladni.gap.robots.answer import Answer, likelier
+from chladni.gap.robots.answer import Answer
 from chladni.gap.robots.pushes import PUSHED
+from chladni.gap.robots.rival import likelier
 from chladni.gap.robots.solved import solved
 from chladni.gap.robots.support import require_in_the_air
 from chladni.gap.robots.torques import Torques, torques_of
