@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from chladni.models.analysis.behaviour import behaviour
-from chladni.models.analysis.influence_coefficients import PAPER_BEHAVIOUR, influence
+from chladni.models.analysis.influence import PAPER_BEHAVIOUR, influence
 from chladni.models.core.reading import InfluenceTable
 from chladni.models.instruments.pneumatic_motor import INSTRUMENT
 

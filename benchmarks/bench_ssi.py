@@ -13,7 +13,7 @@ from pyoma2.setup import SingleSetup
 from scipy.signal import lfilter
 
 from chladni.modal.operational.correlation import correlation_functions
-from chladni.modal.operational.ssi_cov import decompose, order_models, pole_table, subspace_poles
+from chladni.modal.operational.ssi import decompose, order_models, pole_table, subspace_poles
 from chladni.modal.operational.ssi_uncertainty import ErrorPropagation, all_pole_deviations, shape_std
 from chladni.modal.poles.pole_table import PoleTable
 from chladni.signals.channel import Channel

@@ -57,9 +57,9 @@ _HOME = {
     "load_setup": "chladni.io.setup",
     "StudyResults": "chladni.io.study.results",
     "results": "chladni.io.study.results",
-    "DeflectionShape": "chladni.modal.checks.deflection_shapes",
-    "deflection_shape": "chladni.modal.checks.deflection_shapes",
-    "phase_referenced_shape": "chladni.modal.checks.deflection_shapes",
+    "DeflectionShape": "chladni.modal.checks.deflection_shape",
+    "deflection_shape": "chladni.modal.checks.deflection_shape",
+    "phase_referenced_shape": "chladni.modal.checks.deflection_shape",
     "check_driving_point": "chladni.modal.checks.driving_point",
     "check_linearity": "chladni.modal.checks.linearity",
     "check_reciprocity": "chladni.modal.checks.reciprocity",
@@ -82,7 +82,7 @@ _HOME = {
     "validate": "chladni.modal.shapes.validation",
     "Damper": "chladni.models.analysis.damper_placement",
     "place_damper": "chladni.models.analysis.damper_placement",
-    "influence": "chladni.models.analysis.influence_coefficients",
+    "influence": "chladni.models.analysis.influence",
     "optimise": "chladni.models.analysis.optimise",
     "Wish": "chladni.models.analysis.wish",
     "Model": "chladni.models.core.model",
@@ -94,7 +94,7 @@ _HOME = {
     "Simulation": "chladni.models.core.simulation",
     "DRIVES": "chladni.models.drives.catalogue",
     "drive_model": "chladni.models.drives.drive_model",
-    "mr_damper_at": "chladni.models.drives.magnetorheological_damper",
+    "mr_damper_at": "chladni.models.drives.mr_damper",
     "fit_mr_damper": "chladni.models.drives.mr_damper_fit",
     "mr_record": "chladni.models.drives.mr_record",
     "attached": "chladni.models.effects.attached_effect",
@@ -124,7 +124,7 @@ _HOME = {
     "joint_log": "chladni.robots.joint_log",
     "load_robot": "chladni.robots.loading",
     "write_trajectory": "chladni.robots.trajectory",
-    "Bearing": "chladni.signals.bearing",
+    "Bearing": "chladni.spectral.bearings",
     "Cepstrum": "chladni.signals.cepstrum",
     "Channel": "chladni.signals.channel",
     "Coherence": "chladni.signals.coherence",
@@ -173,7 +173,7 @@ _HOME = {
     "coherence": "chladni.spectral.coherence",
     "partial_coherence": "chladni.spectral.coherence",
     "cross_spectra": "chladni.spectral.cross_spectra",
-    "deflection_shapes": "chladni.spectral.deflection",
+    "deflection_shapes": "chladni.spectral.ods",
     "cross_correlation": "chladni.spectral.time_delay",
     "time_delay": "chladni.spectral.time_delay",
     "envelope": "chladni.spectral.envelope",
@@ -182,8 +182,8 @@ _HOME = {
     "highpass": "chladni.spectral.filters",
     "lowpass": "chladni.spectral.filters",
     "convert_form": "chladni.spectral.forms",
-    "find_impacts": "chladni.spectral.impact_testing",
-    "impact_cross_spectra": "chladni.spectral.impact_testing",
+    "find_impacts": "chladni.spectral.impact",
+    "impact_cross_spectra": "chladni.spectral.impact",
     "differentiate": "chladni.spectral.integration",
     "differentiate_density": "chladni.spectral.integration",
     "integrate": "chladni.spectral.integration",
@@ -191,8 +191,8 @@ _HOME = {
     "kurtogram": "chladni.spectral.kurtogram",
     "levels": "chladni.spectral.levels",
     "octaves": "chladni.spectral.octaves",
-    "order_cuts": "chladni.spectral.order_tracking",
-    "order_map": "chladni.spectral.order_tracking",
+    "order_cuts": "chladni.spectral.orders",
+    "order_map": "chladni.spectral.orders",
     "find_peaks": "chladni.spectral.peaks",
     "find_response_peaks": "chladni.spectral.peaks",
     "check_profile": "chladni.spectral.random_vibration",
@@ -201,7 +201,7 @@ _HOME = {
     "vibration_response": "chladni.spectral.random_vibration",
     "rotation": "chladni.spectral.rotation",
     "severity": "chladni.spectral.severity",
-    "srs": "chladni.spectral.shock_response",
+    "srs": "chladni.spectral.srs",
     "check_sine": "chladni.spectral.sine_vibration",
     "sine_limits": "chladni.spectral.sine_vibration",
     "sine_profile": "chladni.spectral.sine_vibration",
@@ -262,9 +262,9 @@ if TYPE_CHECKING:
     from chladni.io.setup import load_setup as load_setup
     from chladni.io.study.results import StudyResults as StudyResults
     from chladni.io.study.results import results as results
-    from chladni.modal.checks.deflection_shapes import DeflectionShape as DeflectionShape
-    from chladni.modal.checks.deflection_shapes import deflection_shape as deflection_shape
-    from chladni.modal.checks.deflection_shapes import phase_referenced_shape as phase_referenced_shape
+    from chladni.modal.checks.deflection_shape import DeflectionShape as DeflectionShape
+    from chladni.modal.checks.deflection_shape import deflection_shape as deflection_shape
+    from chladni.modal.checks.deflection_shape import phase_referenced_shape as phase_referenced_shape
     from chladni.modal.checks.driving_point import check_driving_point as check_driving_point
     from chladni.modal.checks.linearity import check_linearity as check_linearity
     from chladni.modal.checks.reciprocity import check_reciprocity as check_reciprocity
@@ -289,7 +289,7 @@ if TYPE_CHECKING:
     from chladni.modal.shapes.validation import validate as validate
     from chladni.models.analysis.damper_placement import Damper as Damper
     from chladni.models.analysis.damper_placement import place_damper as place_damper
-    from chladni.models.analysis.influence_coefficients import influence as influence
+    from chladni.models.analysis.influence import influence as influence
     from chladni.models.analysis.optimise import optimise as optimise
     from chladni.models.analysis.wish import Wish as Wish
     from chladni.models.core.model import Model as Model
@@ -301,7 +301,7 @@ if TYPE_CHECKING:
     from chladni.models.core.simulation import Simulation as Simulation
     from chladni.models.drives.catalogue import DRIVES as DRIVES
     from chladni.models.drives.drive_model import drive_model as drive_model
-    from chladni.models.drives.magnetorheological_damper import mr_damper_at as mr_damper_at
+    from chladni.models.drives.mr_damper import mr_damper_at as mr_damper_at
     from chladni.models.drives.mr_damper_fit import fit_mr_damper as fit_mr_damper
     from chladni.models.drives.mr_record import mr_record as mr_record
     from chladni.models.effects.attached_effect import attached as attached
@@ -331,7 +331,6 @@ if TYPE_CHECKING:
     from chladni.robots.joint_log import joint_log as joint_log
     from chladni.robots.loading import load_robot as load_robot
     from chladni.robots.trajectory import write_trajectory as write_trajectory
-    from chladni.signals.bearing import Bearing as Bearing
     from chladni.signals.cepstrum import Cepstrum as Cepstrum
     from chladni.signals.channel import Channel as Channel
     from chladni.signals.coherence import Coherence as Coherence
@@ -376,19 +375,19 @@ if TYPE_CHECKING:
     from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum as AmplitudeSpectrum
     from chladni.spectral.amplitude_spectrum import amplitude_spectrum as amplitude_spectrum
     from chladni.spectral.bands import band_rms as band_rms
+    from chladni.spectral.bearings import Bearing as Bearing
     from chladni.spectral.cepstrum import cepstrum as cepstrum
     from chladni.spectral.coherence import coherence as coherence
     from chladni.spectral.coherence import partial_coherence as partial_coherence
     from chladni.spectral.cross_spectra import cross_spectra as cross_spectra
-    from chladni.spectral.deflection import deflection_shapes as deflection_shapes
     from chladni.spectral.envelope import envelope as envelope
     from chladni.spectral.filters import bandpass as bandpass
     from chladni.spectral.filters import bandstop as bandstop
     from chladni.spectral.filters import highpass as highpass
     from chladni.spectral.filters import lowpass as lowpass
     from chladni.spectral.forms import convert_form as convert_form
-    from chladni.spectral.impact_testing import find_impacts as find_impacts
-    from chladni.spectral.impact_testing import impact_cross_spectra as impact_cross_spectra
+    from chladni.spectral.impact import find_impacts as find_impacts
+    from chladni.spectral.impact import impact_cross_spectra as impact_cross_spectra
     from chladni.spectral.integration import differentiate as differentiate
     from chladni.spectral.integration import differentiate_density as differentiate_density
     from chladni.spectral.integration import integrate as integrate
@@ -396,8 +395,9 @@ if TYPE_CHECKING:
     from chladni.spectral.kurtogram import kurtogram as kurtogram
     from chladni.spectral.levels import levels as levels
     from chladni.spectral.octaves import octaves as octaves
-    from chladni.spectral.order_tracking import order_cuts as order_cuts
-    from chladni.spectral.order_tracking import order_map as order_map
+    from chladni.spectral.ods import deflection_shapes as deflection_shapes
+    from chladni.spectral.orders import order_cuts as order_cuts
+    from chladni.spectral.orders import order_map as order_map
     from chladni.spectral.peaks import find_peaks as find_peaks
     from chladni.spectral.peaks import find_response_peaks as find_response_peaks
     from chladni.spectral.random_vibration import check_profile as check_profile
@@ -406,10 +406,10 @@ if TYPE_CHECKING:
     from chladni.spectral.random_vibration import vibration_response as vibration_response
     from chladni.spectral.rotation import rotation as rotation
     from chladni.spectral.severity import severity as severity
-    from chladni.spectral.shock_response import srs as srs
     from chladni.spectral.sine_vibration import check_sine as check_sine
     from chladni.spectral.sine_vibration import sine_limits as sine_limits
     from chladni.spectral.sine_vibration import sine_profile as sine_profile
+    from chladni.spectral.srs import srs as srs
     from chladni.spectral.time_delay import cross_correlation as cross_correlation
     from chladni.spectral.time_delay import time_delay as time_delay
     from chladni.spectral.transmissibility import transmissibility as transmissibility

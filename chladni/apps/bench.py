@@ -115,7 +115,7 @@ def _read(
 
 
 def _influence(instrument: Instrument, values: Values, options: Options) -> InfluenceTable:
-    from chladni.models.analysis.influence_coefficients import influence
+    from chladni.models.analysis.influence import influence
 
     return influence(instrument, values, options)
 

@@ -7,9 +7,9 @@ from chladni.apps.documents import Document, finite, plain
 from chladni.apps.sources import Progress, Span, no_progress, watched_grids
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
-from chladni.signals.bearing import Bearing
 from chladni.signals.envelope import EnvelopeSpectrum, Kurtogram
 from chladni.signals.errors import EstimateError
+from chladni.spectral.bearings import Bearing
 from chladni.spectral.envelope import BandChoice, chosen_bands, envelope_spectra, fault_frequencies_hz
 
 

@@ -13,7 +13,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.order_spectra import OrderCuts, OrderMap, OrderMethod
 from chladni.signals.rotation import Rotation
 from chladni.signals.time_series import TimeSeries
-from chladni.spectral.order_tracking import order_cuts, order_map, strongest_orders
+from chladni.spectral.orders import order_cuts, order_map, strongest_orders
 from chladni.spectral.rotation import rotation
 
 # As many as are told apart in one picture.

@@ -8,7 +8,7 @@ from chladni.gap.records.diagnosis import Diagnosis
 from chladni.signals.cross_spectra import AutoSpectra, CrossSpectra
 from chladni.signals.errors import SetupError
 from chladni.signals.value import Drawn
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 from chladni.viewers.figures.gap_shares import draw_shares, share_label, site_bars
 from chladni.viewers.figures.gap_sheet import gap_sheet
 from chladni.viewers.figures.plot import draw_pictures, pictures

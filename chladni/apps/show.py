@@ -27,7 +27,7 @@ from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.value import Drawn, Value
 from chladni.signals.waterfall import Waterfall
 from chladni.spectral.peaks import find_response_peaks
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 
 ValueT = TypeVar("ValueT", bound=Value)
 Shown = Log | Drawn | Path | str

@@ -36,12 +36,12 @@ from chladni.spectral.adaptive import adaptive_auto_spectra, adaptive_cross_spec
 from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum
 from chladni.spectral.bands import band_rms, total_rms
 from chladni.spectral.blocks import Source
-from chladni.spectral.deflection import deflection_shapes
 from chladni.spectral.excitation import HAMMER_RANGE
-from chladni.spectral.frequency_response import Estimator, frequency_response
+from chladni.spectral.frf import Estimator, frequency_response
+from chladni.spectral.ods import deflection_shapes
 from chladni.spectral.peaks import judged_above_hz
-from chladni.spectral.power_spectral_density import power_spectral_density
 from chladni.spectral.products import PAIRS
+from chladni.spectral.psd import power_spectral_density
 from chladni.spectral.response_advice import longest_segment_s
 from chladni.spectral.segmentation import SHORTEST_SEGMENT
 from chladni.spectral.windows import Window

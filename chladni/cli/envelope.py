@@ -13,8 +13,8 @@ from chladni.signals.text_reading import real_number
 
 if TYPE_CHECKING:
     from chladni.apps.envelope import LogEnvelopes
-    from chladni.signals.bearing import Bearing
     from chladni.signals.envelope import EnvelopeSpectrum, FaultLine
+    from chladni.spectral.bearings import Bearing
 
 MOST_PEAKS = 5
 BEARING_FORM = "elements=N,ball=MM,pitch=MM,angle=DEG"
@@ -80,7 +80,7 @@ def envelope(
 
 
 def _bearing(text: str) -> "Bearing":
-    from chladni.signals.bearing import Bearing
+    from chladni.spectral.bearings import Bearing
 
     pairs = dict(part.partition("=")[::2] for part in text.split(","))
     known = {"elements", "ball", "pitch", "angle"}

@@ -51,7 +51,7 @@ def influence(
     """Influence coefficients of every behaviour parameter to every construction parameter."""
     from chladni.apps.influence_document import influence_document
     from chladni.apps.model_sources import named_instrument
-    from chladni.models.analysis.influence_coefficients import influence as coefficients
+    from chladni.models.analysis.influence import influence as coefficients
     from chladni.models.core.stability import growing_poles
 
     require_places(reads=[Path(model)], writes={"--json": json}, folders={"--figures": figures})
@@ -123,7 +123,7 @@ def _parts(heads: list[str], name_width: int, width: int) -> list[range]:
 
 
 def _rows(names: list[str], coefficients: "Real") -> list[list[str]]:
-    from chladni.models.analysis.influence_coefficients import strongest
+    from chladni.models.analysis.influence import strongest
 
     marked = strongest(coefficients)
     return [

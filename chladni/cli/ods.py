@@ -52,7 +52,7 @@ def ods(
     _print_shapes(out, found)
     out.lines((*told, *found.provenance.notes))
     if figures is not None:
-        from chladni.viewers.figures.deflection import deflection_figures
+        from chladni.viewers.figures.ods import deflection_figures
 
         out.figures("ods", deflection_figures(found), figures)
     out.json(deflection_document, found)

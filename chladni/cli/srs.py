@@ -48,8 +48,8 @@ def srs(
     """Shock response spectra: the largest response of oscillators of every frequency."""
     from chladni.apps.documents import shock_document
     from chladni.apps.findings import reading_sentences
-    from chladni.apps.shock_response import shock_responses
     from chladni.apps.sources import Span
+    from chladni.apps.srs import shock_responses
 
     out = Output.of_log([log, opener.setup], json=json, csv=csv, figures=figures)
     with opener(log) as opened, out.progress(log.name) as progress:
@@ -70,7 +70,7 @@ def srs(
     out.lines((*told, *(note for one in found for note in one.notes)))
     out.csv(found)
     if figures is not None:
-        from chladni.viewers.figures.shock_response import shock_figures
+        from chladni.viewers.figures.srs import shock_figures
 
         out.figures("srs", shock_figures(found), figures)
     out.json(shock_document, found)

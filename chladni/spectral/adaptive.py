@@ -16,7 +16,7 @@ from chladni.signals.time_series import TimeSeries
 from chladni.spectral.accumulator import AutoSpectraAccumulator, require_finite
 from chladni.spectral.blocks import Source, leading_part
 from chladni.spectral.cross_spectra import cross_spectra, segment_average
-from chladni.spectral.impact_testing import (
+from chladni.spectral.impact import (
     Impacts,
     find_impacts,
     impact_auto_spectra,

@@ -14,7 +14,7 @@ from chladni.signals.provenance import Provenance
 from chladni.signals.renamed import renamed
 from chladni.signals.value import Value, of_channel, require_frequency_axis, require_shape
 from chladni.spectral.cross_spectra import spectra_of
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 from chladni.spectral.windows import Window
 
 Quantity = Literal["rms", "peak"]

@@ -18,7 +18,7 @@ from chladni.spectral.accumulator import AutoSpectraAccumulator, one_sided_weigh
 from chladni.spectral.blocks import Source, leading_part
 from chladni.spectral.cross_spectra import segment_average
 from chladni.spectral.leakage import named_window
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 
 # Lines over which a Hann window spreads the mean, which is removed.
 LINES_OF_THE_MEAN = 2

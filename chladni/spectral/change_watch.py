@@ -16,7 +16,7 @@ from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.unit_text import with_unit
 from chladni.spectral.accumulator import AutoSpectraAccumulator
 from chladni.spectral.comparison import compare_densities
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 from chladni.spectral.segmentation import Segmentation
 
 #: Segments of a window that is compared, and its least length.

@@ -11,7 +11,7 @@ from chladni.signals.renamed import renamed
 from chladni.spectral.channel_choice import choose_channels
 from chladni.spectral.cross_spectra import spectra_of
 from chladni.spectral.line_algebra import conditioned_density, solve_lines
-from chladni.spectral.power_spectral_density import auto_densities
+from chladni.spectral.psd import auto_densities
 from chladni.spectral.uncertainty import coherence_std
 from chladni.spectral.windows import Window
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from chladni.io.missing_samples import MissingSamples
 from chladni.io.source import Blocks, SeriesLike, blocks_of, extent_of, log_or_series
-from chladni.signals.bearing import Bearing
 from chladni.signals.channel import Channel, Names
 from chladni.signals.envelope import EnvelopeSpectrum, FaultLine, Kurtogram
 from chladni.signals.errors import SetupError
@@ -18,10 +17,11 @@ from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import power
 from chladni.spectral.accumulator import AutoSpectraAccumulator
 from chladni.spectral.band_filter import BandFilter
+from chladni.spectral.bearings import Bearing
 from chladni.spectral.blocks import Source, leading_part
 from chladni.spectral.kurtogram import kurtogram
 from chladni.spectral.peaks import find_peaks
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 from chladni.spectral.segmentation import plan_segmentation
 
 # Segments end to end that a record is averaged over: few, since lines of slow shafts lie close together.

@@ -6,7 +6,7 @@ import numpy as np
 
 from chladni.signals.arrays import Complex, Mask, Real
 from chladni.signals.cross_spectra import CrossSpectra
-from chladni.spectral.power_spectral_density import auto_densities
+from chladni.spectral.psd import auto_densities
 
 # Power below this share of the strongest lines is below what a 16-bit chain can tell from its own errors.
 DYNAMIC_RANGE = 1e-6

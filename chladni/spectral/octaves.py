@@ -18,7 +18,7 @@ from chladni.spectral.bands import band_rms, total_rms
 from chladni.spectral.blocks import Source
 from chladni.spectral.cross_spectra import segment_average
 from chladni.spectral.leakage import leakage, named_window
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 
 Weighting = Literal["A", "C"]
 # Octaves are divided in so many bands at most (IEC 61260-1:2014, table 1 of bandwidth designators ends with 1/24).

@@ -17,9 +17,9 @@ from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.waterfall import Waterfall
 from chladni.spectral.accumulator import AutoSpectraAccumulator, CrossSpectraAccumulator, SegmentAveraging
 from chladni.spectral.coherence import coherence
-from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.frf import frequency_response
 from chladni.spectral.levels import LevelsAccumulator
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 from chladni.spectral.segmentation import LONGEST_DEFAULT_SEGMENT, Segmentation, plan_segmentation
 from chladni.spectral.severity import Machine, SeverityAccumulator, is_motion
 from chladni.spectral.waterfall import DEFAULT_SEGMENT, WaterfallAccumulator

@@ -14,7 +14,7 @@ from chladni.signals.sine_vibration import SineCheck, SineProfile
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import si_factor
 from chladni.spectral.filters import measured_samples
-from chladni.spectral.order_tracking import order_cuts
+from chladni.spectral.orders import order_cuts
 from chladni.spectral.rotation import rotation
 
 ACCELERATION = "m/s^2"

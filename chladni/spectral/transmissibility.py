@@ -11,7 +11,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.unit_text import in_unit
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.frf import frequency_response
 
 
 def transmissibility(

@@ -4,7 +4,7 @@ from chladni.apps.unit_peaks import unit_peaks
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 
 
 def test_peaks_are_ranked_among_channels_of_one_unit():

@@ -142,7 +142,7 @@ def test_channels_one_at_a_time_tell_what_all_together_do(run_up, monkeypatch):
     whole = found_of(run_up)
     np.testing.assert_allclose(whole[0], [5 / RATE_HZ, 10 / RATE_HZ], atol=2e-5)
     monkeypatch.setattr("chladni.apps.sources.VALUES_TOGETHER", 1)
-    monkeypatch.setattr("chladni.spectral.order_tracking.BATCH_SAMPLES", 1000)
+    monkeypatch.setattr("chladni.spectral.orders.BATCH_SAMPLES", 1000)
     for one, other in zip(found_of(run_up), whole, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.nanmax(np.abs(other)))
 

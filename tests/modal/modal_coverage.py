@@ -7,7 +7,7 @@ import numpy as np
 from chladni.modal.fit.maximum_likelihood import refine
 from chladni.modal.fit.modal_model import ModalModel
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.frf import frequency_response
 from tests.modal.truth import noisy_response, record
 
 SIGMAS = 1.959964

@@ -12,10 +12,10 @@ from chladni.spectral import adaptive as module
 from chladni.spectral.adaptive import adaptive_auto_spectra, adaptive_cross_spectra
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.excitation import excited_lines
-from chladni.spectral.frequency_response import frequency_response
-from chladni.spectral.impact_testing import find_impacts, impact_cross_spectra
+from chladni.spectral.frf import frequency_response
+from chladni.spectral.impact import find_impacts, impact_cross_spectra
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 from tests.spectral.aircraft import PAYLOAD, SHAKER, aircraft
 from tests.spectral.made_signals import blocks, multisine, noise, part, series
 

@@ -11,7 +11,7 @@ from chladni.signals.time_series import TimeSeries
 from chladni.spectral.bands import band_rms, total_rms
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.integration import integrate_density
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 
 RATE_HZ = 100.0
 

@@ -12,8 +12,8 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.comparison import compare_densities, compare_responses
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.frequency_response import frequency_response
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.frf import frequency_response
+from chladni.spectral.psd import power_spectral_density
 
 RATE_HZ = 500.0
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from chladni.signals.bearing import Bearing
 from chladni.signals.errors import EstimateError, SetupError
+from chladni.spectral.bearings import Bearing
 from chladni.spectral.envelope import envelope
 from chladni.spectral.kurtogram import kurtogram
 from tests.spectral.made_signals import blocks, noise, series

@@ -23,7 +23,7 @@ from chladni.spectral.octaves import (
     synthesised_class,
     weighting_db,
 )
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 
 RATE_HZ = 8000.0
 

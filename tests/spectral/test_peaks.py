@@ -13,12 +13,12 @@ from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.frequency_response import frequency_response
-from chladni.spectral.impact_testing import find_impacts, impact_cross_spectra
+from chladni.spectral.frf import frequency_response
+from chladni.spectral.impact import find_impacts, impact_cross_spectra
 from chladni.spectral.peaks import find_peaks, find_response_peaks
 from chladni.spectral.period import find_period
 from chladni.spectral.periodic import periodic_cross_spectra
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 from tests.spectral.measured_logs import aircraft, hammer
 
 RATE_HZ = 1000.0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from chladni.signals.errors import EstimateError
 from chladni.signals.testing import assert_close
-from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.frf import frequency_response
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
 from tests.spectral.aircraft import PAYLOAD, SHAKER, aircraft
 from tests.spectral.made_signals import blocks, multisine, noise, part, series

@@ -9,7 +9,7 @@ from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
 from chladni.spectral.random_vibration import check_profile, probability_density, random_profile, vibration_response
-from chladni.spectral.shock_response import srs
+from chladni.spectral.srs import srs
 from tests.spectral.made_signals import noise, series
 
 G = 9.80665

@@ -5,7 +5,7 @@ import pytest
 
 from chladni.signals.provenance import Provenance
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.frf import frequency_response
 from chladni.spectral.response_advice import closer_lines, half_power_lines, longest_segment_s
 from tests.spectral.made_signals import noise, series
 from tests.spectral.mass_chain import MassChain

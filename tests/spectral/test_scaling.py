@@ -15,8 +15,8 @@ from chladni.signals.time_series import TimeSeries
 from chladni.spectral.adaptive import adaptive_cross_spectra
 from chladni.spectral.coherence import coherence
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.frequency_response import frequency_response
-from chladni.spectral.impact_testing import find_impacts, impact_cross_spectra
+from chladni.spectral.frf import frequency_response
+from chladni.spectral.impact import find_impacts, impact_cross_spectra
 from chladni.spectral.period import find_period
 from chladni.spectral.periodic import periodic_cross_spectra
 from chladni.spectral.waterfall import waterfall

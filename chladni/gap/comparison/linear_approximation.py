@@ -10,7 +10,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.frf import frequency_response
 from chladni.spectral.periodic import Period, periodic_cross_spectra
 
 

@@ -50,17 +50,17 @@ def make_decoder(*, message_encoding: str, schema_name: str, schema_encoding: st
         raise LogError(f"schema {schema_name!r}: {len(schema_data)} bytes; a definition may have {MAX_SCHEMA_BYTES}")
     match message_encoding, schema_encoding:
         case "cdr", "ros2msg":
-            from chladni.io.decoding.binary import BinaryDecoder
+            from chladni.io.decoding.cdr import BinaryDecoder
             from chladni.io.decoding.message_text import parse_ros2_text
 
             return BinaryDecoder(parse_ros2_text(schema_name, definition_text(schema_data)), encapsulated=True)
         case "cdr", "ros2idl" | "omgidl":
-            from chladni.io.decoding.binary import BinaryDecoder
+            from chladni.io.decoding.cdr import BinaryDecoder
             from chladni.io.decoding.idl import parse_idl
 
             return BinaryDecoder(parse_idl(schema_name, definition_text(schema_data)), encapsulated=True)
         case "ros1", "ros1msg":
-            from chladni.io.decoding.binary import BinaryDecoder
+            from chladni.io.decoding.cdr import BinaryDecoder
             from chladni.io.decoding.message_text import parse_ros1_text
 
             return BinaryDecoder(parse_ros1_text(schema_name, definition_text(schema_data)), encapsulated=False)

@@ -186,7 +186,7 @@ def _require_kind(name: str, value: object, annotation: object) -> None:
 
 def reader_of(path: Path | str) -> Reader:
     """Give the reader of a file's kind; `SetupError` naming the kinds when there is none."""
-    from chladni.io.files import arrow, csv, lvm, mat, npz, tdms, uff_contents, wav
+    from chladni.io.files import csv, lvm, mat, npz, parquet, tdms, uff_contents, wav
 
     readers: dict[tuple[str, ...], Reader] = {
         _CSV: csv.read_csv,
@@ -195,7 +195,7 @@ def reader_of(path: Path | str) -> Reader:
         _NPZ: npz.read_npz,
         _NPY: npz.read_npy,
         _UFF: uff_contents.read_universal_file,
-        _ARROW: arrow.read_arrow,
+        _ARROW: parquet.read_arrow,
         _TDMS: tdms.read_tdms,
         _LVM: lvm.read_lvm,
     }
@@ -204,7 +204,7 @@ def reader_of(path: Path | str) -> Reader:
 
 def writer_of(path: Path | str) -> Writer:
     """Give the writer of a file's kind; `SetupError` naming the kinds when there is none."""
-    from chladni.io.files import arrow, csv, mat, npz, uff, wav
+    from chladni.io.files import csv, mat, npz, parquet, uff, wav
 
     writers: dict[tuple[str, ...], Writer] = {
         _CSV: csv.write_csv,
@@ -212,7 +212,7 @@ def writer_of(path: Path | str) -> Writer:
         _MAT: mat.write_mat,
         _NPZ: npz.write_npz,
         _UFF: uff.write_uff,
-        _ARROW: arrow.write_arrow,
+        _ARROW: parquet.write_arrow,
     }
     return _known(writers, path, "written")
 

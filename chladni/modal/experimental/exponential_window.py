@@ -40,7 +40,7 @@ def without_window_damping(modes: ModeSet, decay_per_s: float) -> ModeSet:
     Notes
     -----
     The Laplace transform of x exp(-sigma t) is X(s + sigma). When the window multiplies response *and* force, as in
-    `chladni.spectral.impact_testing.impact_cross_spectra`, the measured function is exactly H(s + sigma), whose poles
+    `chladni.spectral.impact.impact_cross_spectra`, the measured function is exactly H(s + sigma), whose poles
     are lambda_r - sigma (Fladung & Rost 1997). When it multiplies the response only, the force must have ended long
     before 1/sigma after its onset t_0: the poles move in the same way, and participation is too small by the window's
     value there, exp(-sigma t_0), which isn't corrected here because the functions don't tell t_0.

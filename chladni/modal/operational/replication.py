@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from chladni.modal.operational.correlation import CorrelationFunctions
-from chladni.modal.operational.ssi_cov import block_hankel, decompose, order_models, pole_table
+from chladni.modal.operational.ssi import block_hankel, decompose, order_models, pole_table
 from chladni.modal.poles.pole_selection import PoleSelection
 from chladni.modal.poles.pole_table import PoleTable
 from chladni.signals.arrays import Real, Whole

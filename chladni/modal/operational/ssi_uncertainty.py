@@ -9,7 +9,7 @@ from scipy.fft import fft, ifft, next_fast_len
 from scipy.special import ndtri, stdtrit
 
 from chladni.modal.operational.correlation import CorrelationFunctions
-from chladni.modal.operational.ssi_cov import FIRST_LAG, OrderModel, SubspaceDecomposition, continuous
+from chladni.modal.operational.ssi import FIRST_LAG, OrderModel, SubspaceDecomposition, continuous
 from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import EstimateError
 

@@ -16,7 +16,7 @@ from chladni.modal.operational.response_record import (
     read_record,
 )
 from chladni.modal.operational.spectral_decomposition import decompose as decompose_spectra
-from chladni.modal.operational.ssi_cov import OrderModel, SubspaceDecomposition, decompose, order_models, pole_table
+from chladni.modal.operational.ssi import OrderModel, SubspaceDecomposition, decompose, order_models, pole_table
 from chladni.modal.operational.ssi_uncertainty import ErrorPropagation, all_pole_deviations, shape_std, student_factor
 from chladni.modal.operational.subspace_candidates import ChosenPoles, ResponseRules, choose_poles
 from chladni.modal.operational.subspace_plan import SubspacePlan, plan_subspace

@@ -12,7 +12,7 @@ from chladni.signals.channel import find_channels
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import SetupError
 from chladni.spectral.peaks import find_peaks
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 
 Band = tuple[float, float]
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from chladni.models.analysis.frequency_curve import FrequencyCurve, frequency_curve
 from chladni.models.analysis.linear_path import LinearPath
+from chladni.models.analysis.margins import FrequencyMarks, Margin
 from chladni.models.analysis.resolvent import Resolvent
-from chladni.models.analysis.stability_margins import FrequencyMarks, Margin
 from chladni.models.analysis.step_behaviour import none
 from chladni.models.core.reading import Quantity
 from chladni.signals.arrays import Complex

@@ -6,8 +6,8 @@ import numpy as np
 
 from chladni.models.analysis.damper_placement import Damper
 from chladni.models.core.port_law import PortLaw
-from chladni.models.drives.magnetorheological_damper import mr_damper_at
 from chladni.models.drives.mr_coefficients import MrCoefficients
+from chladni.models.drives.mr_damper import mr_damper_at
 from chladni.models.drives.mr_shipped import MEASURED_DAMPER
 from chladni.signals.errors import ModelError
 

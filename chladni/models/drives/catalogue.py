@@ -6,7 +6,7 @@ from types import MappingProxyType
 from chladni.models.drives.dc_servo import DC_SERVO
 from chladni.models.drives.drive_kind import DriveKind
 from chladni.models.drives.hydraulic_motor import HYDRAULIC_MOTOR
-from chladni.models.drives.magnetorheological_damper import MR_DAMPER
+from chladni.models.drives.mr_damper import MR_DAMPER
 from chladni.models.drives.pneumatic_motor import PNEUMATIC_MOTOR
 
 # A kind joins by standing in this tuple.

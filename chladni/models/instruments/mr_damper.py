@@ -10,7 +10,7 @@ from chladni.models.core.instrument import Instrument
 from chladni.models.core.model import Model
 from chladni.models.core.reading import Chart, Curve
 from chladni.models.drives.drive_model import DriveModel
-from chladni.models.drives.magnetorheological_damper import MR_DAMPER
+from chladni.models.drives.mr_damper import MR_DAMPER
 from chladni.models.drives.mr_shipped import MEASURED_STROKE_M
 from chladni.models.instruments.drive_pages import drive_at
 from chladni.signals.arrays import Real

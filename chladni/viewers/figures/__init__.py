@@ -7,14 +7,14 @@ from chladni.viewers.figures.album import Album
 from chladni.viewers.figures.cepstrum import cepstrum_figures
 from chladni.viewers.figures.comparison import comparison_figures
 from chladni.viewers.figures.complexity import complexity_figures
-from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.envelope import envelope_figures
-from chladni.viewers.figures.frequency_response import response_figures
+from chladni.viewers.figures.frf import response_figures
 from chladni.viewers.figures.levels import level_figures, severity_figures
 from chladni.viewers.figures.mac import cross_mac_figure, mac_figures
 from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
 from chladni.viewers.figures.octaves import octave_figures
+from chladni.viewers.figures.psd import density_figures
 from chladni.viewers.figures.relative_motion import relative_motion_figures
 from chladni.viewers.figures.saving import save_album, save_figures
 from chladni.viewers.figures.stabilisation import stabilisation_figures

@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from chladni.signals.study import Study
 from chladni.viewers.figures.cepstrum import cepstrum_figures
 from chladni.viewers.figures.complexity import complexity_figures
-from chladni.viewers.figures.density import density_figures
 from chladni.viewers.figures.envelope import envelope_figures
-from chladni.viewers.figures.frequency_response import response_figures
+from chladni.viewers.figures.frf import response_figures
 from chladni.viewers.figures.levels import level_figures, severity_figures
 from chladni.viewers.figures.log_axis import USUAL, Scales
 from chladni.viewers.figures.mac import mac_figures
@@ -19,6 +18,7 @@ from chladni.viewers.figures.mode_shapes import mode_shape_figures
 from chladni.viewers.figures.nyquist import nyquist_figures
 from chladni.viewers.figures.octaves import octave_figures
 from chladni.viewers.figures.overlay import overlaid_figures
+from chladni.viewers.figures.psd import density_figures
 from chladni.viewers.figures.relative_motion import relative_motion_figures
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.stabilisation import stabilisation_figures

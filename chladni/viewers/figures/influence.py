@@ -24,7 +24,7 @@ def influence_figure(table: InfluenceTable, *, of: Literal["log_derivative", "fi
     Parameters
     ----------
     table
-        From `chladni.models.analysis.influence_coefficients.influence`.
+        From `chladni.models.analysis.influence.influence`.
     of
         ``log_derivative``: d ln(behaviour)/d ln(construction); ``finite``: the paper's R_PCD/R_PCF.
     """

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 
 from chladni.signals.channel import Channel, labels_of
 from chladni.signals.study import Study
-from chladni.viewers.figures.density import draw_densities
-from chladni.viewers.figures.frequency_response import (
+from chladni.viewers.figures.frf import (
     HEIGHTS_IN,
     draw_coherence,
     draw_magnitude,
@@ -18,6 +17,7 @@ from chladni.viewers.figures.frequency_response import (
     is_coherent,
 )
 from chladni.viewers.figures.log_axis import USUAL, Scales
+from chladni.viewers.figures.psd import draw_densities
 from chladni.viewers.figures.sheet import legend, look, plain, sheet
 from chladni.viewers.groups import Group, groups
 from chladni.viewers.panels import Panel, panels

@@ -9,13 +9,13 @@ from chladni.viewers.mode_tables import has_mac, hertz, mode_title
 from chladni.viewers.panels import panels
 from chladni.viewers.rerun.blueprint import ChannelViews, ModesViews, ModeViews, ResponseViews, Views, arrange
 from chladni.viewers.rerun.complexity import draw_complexity
-from chladni.viewers.rerun.deflection import draw_deflections
-from chladni.viewers.rerun.density import draw_densities
 from chladni.viewers.rerun.findings import draw_findings
-from chladni.viewers.rerun.frequency_response import draw_coherence, draw_magnitude, draw_phase
+from chladni.viewers.rerun.frf import draw_coherence, draw_magnitude, draw_phase
 from chladni.viewers.rerun.mac import draw_mac
 from chladni.viewers.rerun.mode_text import draw_mode_text
 from chladni.viewers.rerun.nyquist import draw_nyquist
+from chladni.viewers.rerun.ods import draw_deflections
+from chladni.viewers.rerun.psd import draw_densities
 from chladni.viewers.rerun.shapes import draw_shapes
 from chladni.viewers.rerun.spectrum import draw_spectra
 from chladni.viewers.rerun.stabilisation import draw_stabilisation

@@ -8,7 +8,7 @@ from chladni.signals.arrays import Real
 from chladni.viewers.drawing import line_breaks, ticks
 from chladni.viewers.panels import Panel
 from chladni.viewers.rerun.entities import channel_entity
-from chladni.viewers.rerun.frequency_response import panel_folder
+from chladni.viewers.rerun.frf import panel_folder
 from chladni.viewers.rerun.timelines import frequency_index, send_columns
 from chladni.viewers.style import Style
 

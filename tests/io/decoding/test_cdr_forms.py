@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from chladni.io.decoding import Decoder, binary, make_decoder
+from chladni.io.decoding import Decoder, cdr, make_decoder
 from chladni.io.decoding import walk as walk_module
 from chladni.signals.errors import LogError
 from tests.io.decoding.encoded import CdrWriter, batch_of, decode_all, decoder_of, values_of
@@ -312,7 +312,7 @@ def test_a_list_of_wide_strings_hides_what_follows_too() -> None:
 
 def test_forms_are_measured_once_where_the_usual_one_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     tried = []
-    fitting = binary._fitting
-    monkeypatch.setattr(binary, "_fitting", lambda form, head: (tried.append(form), fitting(form, head))[1])
+    fitting = cdr._fitting
+    monkeypatch.setattr(cdr, "_fitting", lambda form, head: (tried.append(form), fitting(form, head))[1])
     decoder_of("float64 x\nfloat64 y").informed_by([batch_of(written(write_doubles))])
     assert len(tried) == 1

@@ -7,7 +7,7 @@ import pytest
 
 from chladni.modal.checks.linearity import check_linearity
 from chladni.signals.errors import EstimateError
-from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.frf import frequency_response
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
 from tests.modal.made_responses import chain, functions, one_mass
 from tests.spectral.aircraft import ACCELEROMETERS, PAYLOAD, SHAKER, aircraft

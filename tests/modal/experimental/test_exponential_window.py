@@ -17,8 +17,8 @@ from chladni.signals.order_spread import OrderSpread
 from chladni.signals.provenance import Provenance
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.signals.time_series import TimeSeries
-from chladni.spectral.frequency_response import frequency_response
-from chladni.spectral.impact_testing import find_impacts, impact_cross_spectra
+from chladni.spectral.frf import frequency_response
+from chladni.spectral.impact import find_impacts, impact_cross_spectra
 
 FORCE = Channel(name="/hammer", unit="N", role="reference", point="a", direction=(1.0, 0.0, 0.0))
 BASE = replace(FORCE, name="/base", unit="m/s^2", role="response")

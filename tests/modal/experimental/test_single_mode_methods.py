@@ -11,8 +11,8 @@ from chladni.modal.experimental.nyquist_circle import fit_circle
 from chladni.modal.experimental.resonance_lines import mobility_lines
 from chladni.signals.errors import EstimateError
 from chladni.signals.provenance import Provenance
-from chladni.spectral.frequency_response import frequency_response
-from chladni.spectral.impact_testing import find_impacts, impact_cross_spectra
+from chladni.spectral.frf import frequency_response
+from chladni.spectral.impact import find_impacts, impact_cross_spectra
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
 from tests.modal import truth
 from tests.modal.made_responses import chain, functions, one_mass

@@ -8,7 +8,7 @@ import pytest
 from chladni.modal.fit.leakage_scatter import LAGS, leakage_scatter
 from chladni.modal.fit.model_lines import model_lines
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.frf import frequency_response
 from tests.modal.truth import ModalTruth, noisy_response, record
 
 ONE = ModalTruth(frequency_hz=np.array([1.0]), damping_ratio=np.array([0.01]), shapes=np.ones((1, 1)))

@@ -8,7 +8,7 @@ from chladni.signals.channel import Channel
 from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.frf import frequency_response
 
 
 def test_closed_forms():

@@ -4,7 +4,7 @@ import numpy as np
 
 from chladni.modal.operational.correlation import correlation_functions
 from chladni.modal.operational.replication import replication
-from chladni.modal.operational.ssi_cov import subspace_poles
+from chladni.modal.operational.ssi import subspace_poles
 from chladni.modal.poles.pole_selection import select_poles
 from tests.modal.truth import ambient_record, chain, noise_record
 

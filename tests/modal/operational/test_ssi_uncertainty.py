@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.modal.operational.test_ssi_cov import TRUTH, exact_functions
 
 from chladni.modal.operational.correlation import correlation_functions
-from chladni.modal.operational.ssi_cov import continuous, decompose, order_models, shapes_of
+from chladni.modal.operational.ssi import continuous, decompose, order_models, shapes_of
 from chladni.modal.operational.ssi_uncertainty import (
     ErrorPropagation,
     all_pole_deviations,
@@ -15,7 +16,6 @@ from chladni.modal.operational.ssi_uncertainty import (
     student_factor,
 )
 from chladni.signals.errors import EstimateError
-from tests.modal.operational.test_ssi_cov import TRUTH, exact_functions
 from tests.modal.truth import ambient_record, chain
 
 

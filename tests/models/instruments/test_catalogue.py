@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 
-from chladni.models.analysis.influence_coefficients import influence
+from chladni.models.analysis.influence import influence
 from chladni.models.analysis.instrument_reading import read_instrument
 from chladni.models.core.reading import InstrumentReading
 from chladni.models.excitations.step import Step

@@ -1,4 +1,4 @@
-"""Tables of Apache Arrow: Parquet, Feather and Arrow files, by pyarrow."""
+"""Parquet, Feather and Arrow files: tables of Apache Arrow, by pyarrow."""
 
 import json
 from collections.abc import Mapping, Sequence

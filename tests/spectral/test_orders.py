@@ -8,7 +8,7 @@ import pytest
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
-from chladni.spectral.order_tracking import order_cuts, order_map, strongest_orders
+from chladni.spectral.orders import order_cuts, order_map, strongest_orders
 from chladni.spectral.rotation import rotation
 from tests.spectral.made_signals import series
 

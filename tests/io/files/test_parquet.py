@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyarrow import feather, ipc, parquet
 
-from chladni.io.files.arrow import read_arrow, write_arrow
+from chladni.io.files.parquet import read_arrow, write_arrow
 from chladni.signals.channel import Channel
 from chladni.signals.errors import ChladniError, LogError, SetupError
 from chladni.signals.testing import assert_close

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from chladni.signals.errors import EstimateError, SetupError
-from chladni.spectral.shock_response import srs
+from chladni.spectral.srs import srs
 from tests.spectral.made_signals import blocks, noise, part, series
 
 RATE_HZ = 20_000.0

@@ -9,8 +9,8 @@ import pytest
 from chladni.models.analysis.frequency_behaviour import frequency_behaviour, frequency_quantities
 from chladni.models.analysis.frequency_curve import frequency_curve
 from chladni.models.analysis.linear_path import linear_path
+from chladni.models.analysis.margins import FrequencyMarks
 from chladni.models.analysis.resolvent import Resolvent
-from chladni.models.analysis.stability_margins import FrequencyMarks
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.state_space import StateSpace
 from tests.models.analysis.systems import compiled, gain_only, of_control, pt2, state_space

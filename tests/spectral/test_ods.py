@@ -6,7 +6,7 @@ import pytest
 from chladni.signals.errors import EstimateError
 from chladni.spectral.adaptive import adaptive_cross_spectra
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.deflection import deflection_shapes
+from chladni.spectral.ods import deflection_shapes
 from tests.spectral.made_signals import noise, series
 
 RATE_HZ = 1000.0

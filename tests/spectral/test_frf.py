@@ -9,7 +9,7 @@ from pyFRF import FRF
 from chladni.signals.errors import EstimateError, SetupError
 from chladni.spectral.coherence import coherence
 from chladni.spectral.cross_spectra import cross_spectra
-from chladni.spectral.frequency_response import frequency_response
+from chladni.spectral.frf import frequency_response
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
 from tests.spectral.made_signals import multisine, noise, series
 from tests.spectral.mass_chain import MassChain

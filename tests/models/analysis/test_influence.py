@@ -7,7 +7,7 @@ import pytest
 
 from chladni.models.analysis.behaviour import behaviour
 from chladni.models.analysis.difference import relative_derivative
-from chladni.models.analysis.influence_coefficients import BEHAVIOUR, PAPER_BEHAVIOUR, influence, strongest
+from chladni.models.analysis.influence import BEHAVIOUR, PAPER_BEHAVIOUR, influence, strongest
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port_law import PortLaw

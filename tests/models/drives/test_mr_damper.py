@@ -7,7 +7,7 @@ from chladni.io.log import open_log
 from chladni.models.core.port import Port
 from chladni.models.drives.catalogue import DRIVES
 from chladni.models.drives.drive_model import drive_model
-from chladni.models.drives.magnetorheological_damper import MR_DAMPER, mr_damper_at, mr_damper_kind
+from chladni.models.drives.mr_damper import MR_DAMPER, mr_damper_at, mr_damper_kind
 from chladni.models.drives.mr_shipped import MEASURED_DAMPER, MEASURED_DAMPER_ASYMMETRIC
 from chladni.models.drives.pneumatic_motor import PNEUMATIC_MOTOR
 from chladni.models.files.model_file import load_model

@@ -2,8 +2,8 @@
 
 import pytest
 
-from chladni.signals.bearing import Bearing
 from chladni.signals.errors import EstimateError
+from chladni.spectral.bearings import Bearing
 
 #: SKF 6205-2RS of the Case Western Reserve bearing data, diameters in inches.
 SKF_6205 = Bearing(elements=9, element_diameter=0.3126, pitch_diameter=1.537)

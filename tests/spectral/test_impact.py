@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries
-from chladni.spectral.frequency_response import frequency_response
-from chladni.spectral.impact_testing import find_impacts, impact_cross_spectra, is_impact_test
+from chladni.spectral.frf import frequency_response
+from chladni.spectral.impact import find_impacts, impact_cross_spectra, is_impact_test
 from chladni.spectral.peaks import find_response_peaks
 from tests.spectral.measured_logs import hammer
 

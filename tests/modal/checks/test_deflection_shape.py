@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.modal.checks.deflection_shapes import deflection_shape, phase_referenced_shape
+from chladni.modal.checks.deflection_shape import deflection_shape, phase_referenced_shape
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError
 from chladni.signals.time_series import TimeSeries

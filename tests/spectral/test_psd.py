@@ -6,7 +6,7 @@ from scipy.signal import welch
 
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.periodic import find_period, periodic_cross_spectra
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 from tests.spectral.made_signals import multisine, noise, series
 
 

@@ -12,7 +12,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.shock_response import ShockResponse
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.blocks import leading_part
-from chladni.spectral.shock_response import ACCELERATIONS, RATE_OVER_HIGHEST, srs
+from chladni.spectral.srs import ACCELERATIONS, RATE_OVER_HIGHEST, srs
 
 
 def shock_responses(

@@ -19,7 +19,7 @@ from chladni.spectral.force_pulses import (
     find_pulses,
     typical_peak,
 )
-from chladni.spectral.hammer_hits import Hit, Impacts, Judge, Rejection
+from chladni.spectral.hammer import Hit, Impacts, Judge, Rejection
 from chladni.spectral.products import PAIRS, POWERS, Products, SpectraT
 from chladni.spectral.stretches import valid_runs
 

@@ -1,4 +1,4 @@
-"""Decoder of encodings that lay fields one after another without tags: CDR (ROS 2) and ROS 1."""
+"""CDR of ROS 2, and ROS 1: fields one after another without tags, read out of many messages at once."""
 
 from __future__ import annotations
 

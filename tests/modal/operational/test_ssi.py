@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm, solve_discrete_lyapunov
 
 from chladni.modal.operational.correlation import CorrelationFunctions, correlation_functions
-from chladni.modal.operational.ssi_cov import block_hankel, decompose, order_models, shapes_of, subspace_poles
+from chladni.modal.operational.ssi import block_hankel, decompose, order_models, shapes_of, subspace_poles
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, SetupError
 from tests.modal.truth import ambient_record, chain, mac

@@ -13,7 +13,7 @@ from chladni.signals.errors import EstimateError
 from chladni.spectral.cross_spectra import cross_spectra
 from chladni.spectral.leakage import named_window
 from chladni.spectral.peaks import find_peaks
-from chladni.spectral.power_spectral_density import power_spectral_density
+from chladni.spectral.psd import power_spectral_density
 
 
 def deflection_shapes(
