@@ -19,9 +19,10 @@ import numpy as np
 from mcap.reader import make_reader
 
 from chladni.apps.demo_log import make_demo_log
+from chladni.apps.frf import frf
 from chladni.apps.live import live
 from chladni.apps.modes import identify_modes
-from chladni.apps.spectra import frf, psd
+from chladni.apps.psd import psd
 from chladni.io.live.followed_log import StandardInput
 from chladni.io.live.foxglove import FoxgloveServer
 from chladni.io.live.instrument import Instrument, LiveInstrument, Taken

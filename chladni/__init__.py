@@ -37,8 +37,8 @@ _HOME = {
     "plot": "chladni.apps.plot",
     "show": "chladni.apps.show",
     "write_report": "chladni.apps.show",
-    "frf": "chladni.apps.spectra",
-    "psd": "chladni.apps.spectra",
+    "frf": "chladni.apps.frf",
+    "psd": "chladni.apps.psd",
     "compare_levels": "chladni.gap.comparison.levels",
     "diagnose_simulator": "chladni.gap.diagnosis.of_simulator",
     "explained_simulator": "chladni.gap.diagnosis.of_simulator",
@@ -174,7 +174,7 @@ _HOME = {
     "partial_coherence": "chladni.spectral.coherence",
     "cross_spectra": "chladni.spectral.cross_spectra",
     "deflection_shapes": "chladni.spectral.ods",
-    "cross_correlation": "chladni.spectral.time_delay",
+    "cross_correlation": "chladni.spectral.cross_correlation",
     "time_delay": "chladni.spectral.time_delay",
     "envelope": "chladni.spectral.envelope",
     "bandpass": "chladni.spectral.filters",
@@ -196,9 +196,9 @@ _HOME = {
     "find_peaks": "chladni.spectral.peaks",
     "find_response_peaks": "chladni.spectral.peaks",
     "check_profile": "chladni.spectral.random_vibration",
-    "probability_density": "chladni.spectral.random_vibration",
+    "probability_density": "chladni.spectral.probability_density",
     "random_profile": "chladni.spectral.random_vibration",
-    "vibration_response": "chladni.spectral.random_vibration",
+    "vibration_response": "chladni.spectral.miles",
     "rotation": "chladni.spectral.rotation",
     "severity": "chladni.spectral.severity",
     "srs": "chladni.spectral.srs",
@@ -233,6 +233,7 @@ if TYPE_CHECKING:
     from chladni.apps.diagnose import diagnose_gap as diagnose_gap
     from chladni.apps.explained_model import explained_model as explained_model
     from chladni.apps.explained_model import tuned_model as tuned_model
+    from chladni.apps.frf import frf as frf
     from chladni.apps.level_location import LevelLocation as LevelLocation
     from chladni.apps.level_location import locate_from_levels as locate_from_levels
     from chladni.apps.live import live as live
@@ -240,10 +241,9 @@ if TYPE_CHECKING:
     from chladni.apps.picking import ModePicking as ModePicking
     from chladni.apps.picking import pick_modes as pick_modes
     from chladni.apps.plot import plot as plot
+    from chladni.apps.psd import psd as psd
     from chladni.apps.show import show as show
     from chladni.apps.show import write_report as write_report
-    from chladni.apps.spectra import frf as frf
-    from chladni.apps.spectra import psd as psd
     from chladni.gap.comparison.levels import compare_levels as compare_levels
     from chladni.gap.diagnosis.of_simulator import diagnose_simulator as diagnose_simulator
     from chladni.gap.diagnosis.of_simulator import explained_simulator as explained_simulator
@@ -379,6 +379,7 @@ if TYPE_CHECKING:
     from chladni.spectral.cepstrum import cepstrum as cepstrum
     from chladni.spectral.coherence import coherence as coherence
     from chladni.spectral.coherence import partial_coherence as partial_coherence
+    from chladni.spectral.cross_correlation import cross_correlation as cross_correlation
     from chladni.spectral.cross_spectra import cross_spectra as cross_spectra
     from chladni.spectral.envelope import envelope as envelope
     from chladni.spectral.filters import bandpass as bandpass
@@ -394,23 +395,22 @@ if TYPE_CHECKING:
     from chladni.spectral.integration import integrate_density as integrate_density
     from chladni.spectral.kurtogram import kurtogram as kurtogram
     from chladni.spectral.levels import levels as levels
+    from chladni.spectral.miles import vibration_response as vibration_response
     from chladni.spectral.octaves import octaves as octaves
     from chladni.spectral.ods import deflection_shapes as deflection_shapes
     from chladni.spectral.orders import order_cuts as order_cuts
     from chladni.spectral.orders import order_map as order_map
     from chladni.spectral.peaks import find_peaks as find_peaks
     from chladni.spectral.peaks import find_response_peaks as find_response_peaks
+    from chladni.spectral.probability_density import probability_density as probability_density
     from chladni.spectral.random_vibration import check_profile as check_profile
-    from chladni.spectral.random_vibration import probability_density as probability_density
     from chladni.spectral.random_vibration import random_profile as random_profile
-    from chladni.spectral.random_vibration import vibration_response as vibration_response
     from chladni.spectral.rotation import rotation as rotation
     from chladni.spectral.severity import severity as severity
     from chladni.spectral.sine_vibration import check_sine as check_sine
     from chladni.spectral.sine_vibration import sine_limits as sine_limits
     from chladni.spectral.sine_vibration import sine_profile as sine_profile
     from chladni.spectral.srs import srs as srs
-    from chladni.spectral.time_delay import cross_correlation as cross_correlation
     from chladni.spectral.time_delay import time_delay as time_delay
     from chladni.spectral.transmissibility import transmissibility as transmissibility
     from chladni.spectral.transmissibility import transmissibility_along as transmissibility_along

@@ -69,6 +69,27 @@ def test_each_public_name_comes_from_the_module_that_defines_it(name: str) -> No
         assert getattr(importlib.import_module(found.__module__), name) is found
 
 
+# Verbs in a file that is named for what all of its verbs do, or for the field's own word.
+OF_A_KIND = {
+    "filters": {"bandpass", "bandstop", "highpass", "lowpass"},
+    "integration": {"differentiate", "differentiate_density", "integrate", "integrate_density"},
+    "bench": {"notebook"}, "picking": {"pick_modes"}, "show": {"write_report"}, "saving": {"save_figures"},
+    "log": {"open"}, "writer": {"write_mcap"}, "loading": {"load_robot"}, "validation": {"validate"},
+    "roving": {"join_references"}, "scaling": {"unit_modal_mass_shapes"}, "ods": {"deflection_shapes"},
+    "random_vibration": {"check_profile"}, "miles": {"vibration_response"},
+}  # fmt: skip
+
+
+def words_of(name: str) -> set[str]:
+    return {word.removesuffix("s") for word in name.split("_")}
+
+
+@pytest.mark.parametrize("verb", [name for name in sorted(SURFACE) if name.islower()])
+def test_the_file_that_holds_a_verb_bears_its_name(verb: str) -> None:
+    stem = getattr(chladni, verb).__module__.rpartition(".")[2]
+    assert words_of(stem) & words_of(verb) or verb in OF_A_KIND.get(stem, set())
+
+
 # What an argument is never called, since another word is used for it everywhere.
 SYNONYMS = {
     "reference": "references", "response": "responses", "channel": "channels", "names": "channels",

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 from chladni.apps.excitation import excitations
 from chladni.apps.findings import peak_sentence, response_sentences, soundness_sentences
+from chladni.apps.frf import transfer
+from chladni.apps.psd import densities
 from chladni.apps.sources import Progress, Span, no_progress
-from chladni.apps.spectra import Averaging, densities, transfer
+from chladni.apps.spectra import Averaging
 from chladni.apps.unit_peaks import unit_peaks
 from chladni.io.log import Log, open_log
 from chladni.io.log_reader import MostlyEmptyError

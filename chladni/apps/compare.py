@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from chladni.apps.excitation import excitations
+from chladni.apps.frf import transfer
 from chladni.apps.modes import identify_modes
+from chladni.apps.psd import densities
 from chladni.apps.sources import Progress, Span, no_progress
-from chladni.apps.spectra import Averaging, densities, transfer
+from chladni.apps.spectra import Averaging
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.modal.shapes.mode_comparison import compare_modes

@@ -23,7 +23,7 @@ from chladni.models.files.model_file import load_model
 from chladni.robots.loading import is_robot_file, load_robot
 from chladni.robots.robot import Robot
 from chladni.signals.errors import LogError, SetupError
-from chladni.signals.resampling import JoinMethod
+from chladni.signals.join import JoinMethod
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.visible import visible
 
@@ -65,7 +65,7 @@ def diagnose_gap(
     start_s, end_s
         Only samples with ``start_s <= t < end_s``, seconds from each log's start.
     join
-        How channels of several sampling grids become one, see `chladni.signals.resampling.join_resampled`.
+        How channels of several sampling grids become one, see `chladni.signals.join.join_resampled`.
     state, command
         Of a robot: topics of the log with its joints' states and commands; chosen where they aren't given.
     progress

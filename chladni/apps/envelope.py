@@ -9,8 +9,8 @@ from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.envelope import EnvelopeSpectrum, Kurtogram
 from chladni.signals.errors import EstimateError
-from chladni.spectral.bearings import Bearing
-from chladni.spectral.envelope import BandChoice, chosen_bands, envelope_spectra, fault_frequencies_hz
+from chladni.spectral.bearings import Bearing, fault_frequencies_hz
+from chladni.spectral.envelope import BandChoice, chosen_bands, envelope_spectra
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

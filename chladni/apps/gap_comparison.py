@@ -17,8 +17,8 @@ from chladni.gap.records.measurement import Measurement
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import LogError
+from chladni.signals.join import JoinMethod
 from chladni.signals.number_range import rms
-from chladni.signals.resampling import JoinMethod
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted
 from chladni.viewers.engineering import percent

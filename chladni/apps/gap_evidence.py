@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from chladni.apps.spectra import psd
+from chladni.apps.psd import psd
 from chladni.gap.records.diagnosis import Diagnosis, GapSignals
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from chladni.apps.spectra import frf, psd
+from chladni.apps.frf import frf
+from chladni.apps.psd import psd
 from chladni.models.core.reading import Chart, Curve, Quantity
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.channel import Channel

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chladni.apps.excitation import excitation_names, stored_functions
+from chladni.apps.frf import transfer
 from chladni.apps.modal_channels import motions_of_one_unit, responses_alone
 from chladni.apps.sources import Progress, Span, Watched, no_progress
-from chladni.apps.spectra import Averaging, transfer
+from chladni.apps.spectra import Averaging
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.io.source import SeriesLike, log_or_series, response_of

@@ -12,7 +12,8 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.levels import DECIBEL_REFERENCES, OctaveLevels, decibels
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.spectral.blocks import leading_part
-from chladni.spectral.octaves import Weighting, lowest_band_hz, octave_density, octave_resolution_hz, octaves
+from chladni.spectral.octaves import lowest_band_hz, octave_density, octave_resolution_hz, octaves
+from chladni.spectral.weighting import Weighting
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

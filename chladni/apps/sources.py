@@ -17,7 +17,7 @@ from chladni.io.source import block_seconds, is_small
 from chladni.signals.arrays import Real
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError
-from chladni.signals.resampling import JoinMethod, join_note, join_resampled
+from chladni.signals.join import JoinMethod, join_note, join_resampled
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import counted
 

@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from chladni.apps.psd import densities
 from chladni.apps.sources import Progress, Span, no_progress
-from chladni.apps.spectra import Averaging, densities
+from chladni.apps.spectra import Averaging
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
 from chladni.signals.errors import EstimateError

@@ -39,7 +39,7 @@ def frf(
     """Transfer functions and coherence, with their uncertainty; of several logs over one another."""
     from chladni.apps.documents import frf_document
     from chladni.apps.findings import reading_sentences
-    from chladni.apps.spectra import transfer
+    from chladni.apps.frf import transfer
     from chladni.signals.study import Study
     from chladni.spectral.peaks import find_response_peaks
 

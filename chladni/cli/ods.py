@@ -34,8 +34,9 @@ def ods(
     """Operating deflection shapes: amplitude and phase of all points at chosen frequencies."""
     from chladni.apps.documents import deflection_document
     from chladni.apps.findings import reading_sentences
+    from chladni.apps.ods import log_deflection
     from chladni.apps.sources import Span
-    from chladni.apps.spectra import Averaging, log_deflection
+    from chladni.apps.spectra import Averaging
 
     out = Output.of_log([log, opener.setup], json=json, figures=figures)
     with opener(log) as opened, out.progress(log.name) as progress:

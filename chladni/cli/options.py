@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from chladni.apps.sources import Span
     from chladni.apps.spectra import Averaging
     from chladni.cli.output import Output
-    from chladni.signals.resampling import JoinMethod
+    from chladni.signals.join import JoinMethod
     from chladni.spectral.bands import EstimateT
 
 _NUMBER = r"(\+?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"

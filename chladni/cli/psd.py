@@ -31,7 +31,7 @@ def psd(
     """Averaged power spectral densities with named peaks; of several logs over one another."""
     from chladni.apps.documents import psd_document
     from chladni.apps.findings import reading_sentences
-    from chladni.apps.spectra import densities
+    from chladni.apps.psd import densities
     from chladni.apps.unit_peaks import unit_peaks
     from chladni.signals.study import Study
 

@@ -35,7 +35,7 @@ def zoom(
     from chladni.apps.documents import zoom_document
     from chladni.apps.findings import reading_sentences
     from chladni.apps.sources import Span
-    from chladni.apps.spectra import zoomed
+    from chladni.apps.zoom import zoomed
 
     out = Output.of_log([log, opener.setup], json=json, figures=figures)
     with opener(log) as opened, out.progress(log.name) as progress:

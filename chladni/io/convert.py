@@ -15,7 +15,7 @@ from chladni.signals.errors import LogError, SetupError
 from chladni.signals.time_series import TimeSeries
 
 if TYPE_CHECKING:
-    from chladni.signals.resampling import JoinMethod
+    from chladni.signals.join import JoinMethod
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +80,7 @@ def convert(
     resample_hz
         Bring all channels to this rate.
     join
-        How, see `chladni.signals.resampling.join_resampled`: ``band-limited``, ``hold``, or what each channel tells.
+        How, see `chladni.signals.join.join_resampled`: ``band-limited``, ``hold``, or what each channel tells.
     layout
         Of a log: ``messages`` or ``batches``, see `chladni.io.mcap.writer.write_mcap`. By default messages, when all
         names are message paths, else batches, which keep any name.
@@ -141,7 +141,7 @@ def _read(
     notes = (*(loss.what for loss in log.damage), *log.notes)
     if resample_hz is None:
         return series, notes
-    from chladni.signals.resampling import join_note, join_resampled
+    from chladni.signals.join import join_note, join_resampled
 
     found = join_resampled(series, sample_rate_hz=resample_hz, method=join)
     joined = found.series if channels is None else found.series.select(log.names(channels))

@@ -23,8 +23,8 @@ from chladni.signals.time_series import TimeSeries
 if TYPE_CHECKING:
     from chladni.io.number_lists import NumberLists
     from chladni.signals.frequency_response import FrequencyResponse
+    from chladni.signals.join import JoinMethod
     from chladni.signals.mode_set import ModeSet
-    from chladni.signals.resampling import JoinMethod
 
 
 def open(  # noqa: A001  # as in gzip and tarfile: users write chladni.open
@@ -191,7 +191,7 @@ class Log(ABC):
         sample_rate_hz
             Rate of the grid; by default that of the channels, or as `join` chooses it.
         join
-            How channels of different grids become one, see `chladni.signals.resampling.join_resampled`:
+            How channels of different grids become one, see `chladni.signals.join.join_resampled`:
             ``band-limited``, ``hold``, or ``auto``, as each channel tells. By default ``band-limited`` at
             `sample_rate_hz`; without either such channels are refused.
 
@@ -210,7 +210,7 @@ class Log(ABC):
         groups = self.read_groups(paths, start_s=start_s, end_s=end_s, one_clock=True)
         if sample_rate_hz is not None or (join is not None and len(groups) > 1):
             # Resampling brings in scipy's filters, which a plain read does without.
-            from chladni.signals.resampling import join as on_one_grid
+            from chladni.signals.join import join as on_one_grid
 
             joined = on_one_grid(groups, sample_rate_hz=sample_rate_hz, method=join or "band-limited")
             return joined if paths is None else joined.select(list(self.names(paths)))

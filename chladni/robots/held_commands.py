@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chladni.signals.errors import LogError
-from chladni.signals.resampling import join_resampled
+from chladni.signals.join import join_resampled
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted
 

@@ -11,7 +11,7 @@ import numpy as np
 from chladni.io.message_path import topic_text
 from chladni.robots.floating_base import floating_base
 from chladni.signals.errors import LogError
-from chladni.signals.resampling import join_resampled
+from chladni.signals.join import join_resampled
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.visible import visible
 from chladni.signals.wording import near_matches

@@ -10,7 +10,7 @@ import numpy as np
 
 from chladni.io.known_schemas import is_command
 from chladni.signals.errors import LogError
-from chladni.signals.resampling import join_resampled
+from chladni.signals.join import join_resampled
 from chladni.signals.visible import visible
 from chladni.signals.wording import near_matches
 

@@ -12,24 +12,20 @@ from numpy.typing import NDArray
 
 from chladni.signals.arrays import Mask, Whole
 from chladni.signals.channel import Channel
+from chladni.signals.clipping import beyond_range, clipped
+from chladni.signals.sensor_record import SensorRecord, runs, sensor_record
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.unit_text import with_unit
 from chladni.signals.wording import counted
 
 FaultKind = Literal["clipped", "dead", "dropouts", "spikes", "not-a-number", "coarse"]
-# A range that is named is reached a little early by offset and gain of a real amplifier.
-_NEAR_OVERLOAD = 0.999
-_SHORTEST_PLATEAU = 3
 # Where values hardly repeat by chance, and where they may.
 _SHORTEST_HOLD, _SURE_HOLD = 4, 8
-# A leap is this many medians of the local step; Gaussian noise of 10^7 samples reaches 8.
-_LEAP = 30.0
-_LEAP_BLOCK = 4096
 _WIDEST_SPIKE = 3
 _QUIET_AROUND = 8
 _FEWEST = 16
-# Faults of a record that may be due to values that repeat by chance: cut off at its end; held anywhere in it.
-_CHANCE, _CHANCE_HELD = 1e-3, 1e-5
+# Runs of a record that may be due to values that repeat by chance, where it seems held.
+_CHANCE_HELD = 1e-5
 # What the whole record shows isn't counted.
 _THROUGHOUT = ("dead", "coarse")
 
@@ -77,26 +73,6 @@ def moments(first_s: float, last_s: float) -> str:
     ('between 0 and 0.8125 s', 'at 3.2 s')
     """
     return f"at {first_s:.4g} s" if first_s == last_s else f"between {first_s:.4g} and {last_s:.4g} s"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Record:
-    """Good samples of a channel, with what several rules need of them."""
-
-    channel: Channel
-    samples: NDArray[np.floating]
-    still: Whole
-    leaps: Whole
-    typical_step: float
-    smallest_step: float
-    low: float
-    high: float
-
-    def step(self, places: Whole) -> NDArray[np.floating]:
-        """Magnitude of the steps from these samples to the next ones; 0 outside."""
-        inside = np.clip(places, 0, self.samples.size - 2)
-        steps = np.abs(self.samples[inside + 1] - self.samples[inside])
-        return np.where(inside == places, steps, 0)
 
 
 def sensor_quality(series: TimeSeries) -> tuple[SensorFault, ...]:
@@ -157,18 +133,18 @@ def _channel_faults(
     if values.size >= _FEWEST:
         # A step between the largest numbers is infinite, and compares as such.
         with np.errstate(over="ignore"):
-            faults += _faults_of(_record(channel, values), place)
+            faults += _faults_of(sensor_record(channel, values), place)
     return [replace(one, first_s=one.first_s / rate_hz, last_s=one.last_s / rate_hz) for one in faults]
 
 
-def _faults_of(record: _Record, place: Whole | None) -> list[SensorFault]:
+def _faults_of(record: SensorRecord, place: Whole | None) -> list[SensorFault]:
     """Apply the rules; `first_s` and `last_s` are indices until the caller knows better."""
     channel = record.channel
-    if _is_dead(record) and not _beyond_range(record).size:
+    if _is_dead(record) and not beyond_range(record).size:
         everything = np.arange(record.samples.size)
         return _fault(channel, "dead", everything, _dead_told(record), place)
-    clipped, told = _clipped(record)
-    faults = _fault(channel, "clipped", clipped, told, place)
+    cut_off, told = clipped(record)
+    faults = _fault(channel, "clipped", cut_off, told, place)
     told = ("is held or zero amid motion", "check transmission")
     faults += _fault(channel, "dropouts", _held(record), told, place)
     told = ("leaps away and back", "check connectors and grounding")
@@ -180,7 +156,7 @@ def _faults_of(record: _Record, place: Whole | None) -> list[SensorFault]:
     return faults
 
 
-def _dead_told(record: _Record) -> tuple[str, str]:
+def _dead_told(record: SensorRecord) -> tuple[str, str]:
     if record.low == record.high == 0:
         return "is 0 throughout", "the sensor isn't connected or nobody fills this field"
     level = with_unit(f"{record.low:.6g}", record.channel.unit)
@@ -209,40 +185,7 @@ def _fault(
     ]
 
 
-def _record(channel: Channel, samples: NDArray[np.floating]) -> _Record:
-    starts = np.unique(np.linspace(0, max(0, samples.size - _LEAP_BLOCK), 64).astype(np.int64))
-    some = np.concatenate([np.abs(np.diff(samples[start : start + _LEAP_BLOCK])) for start in starts])
-    moving = some[some > 0]
-    typical = float(np.median(moving)) if moving.size else 0.0
-    smallest = float(moving.min()) if moving.size else 0.0
-    still, leaps = _scan(samples, floor=max(0.25 * _LEAP * typical, 4 * smallest))
-    return _Record(
-        channel=channel,
-        samples=samples,
-        still=still,
-        leaps=leaps,
-        typical_step=typical,
-        smallest_step=smallest,
-        low=float(samples.min()),
-        high=float(samples.max()),
-    )
-
-
-def _scan(samples: NDArray[np.floating], *, floor: float) -> tuple[Whole, Whole]:
-    """Find steps of zero, and leaps: steps above `floor` and far above the median of their block of 4096."""
-    still, leaps = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
-    for start in range(0, samples.size - 1, _LEAP_BLOCK):
-        # A block at a time stays in the cache.
-        steps = np.abs(np.diff(samples[start : start + _LEAP_BLOCK + 1]))
-        if steps.min() == 0:
-            still.append(np.flatnonzero(steps == 0) + start)
-        if steps.max() > floor:
-            limit = max(_LEAP * float(np.median(steps[::8])), floor)
-            leaps.append(np.flatnonzero(steps > limit) + start)
-    return np.concatenate(still), np.concatenate(leaps)
-
-
-def _is_dead(record: _Record) -> bool:
+def _is_dead(record: SensorRecord) -> bool:
     span = record.high - record.low
     if span == 0:
         return True
@@ -252,81 +195,17 @@ def _is_dead(record: _Record) -> bool:
     return tiny and np.unique(record.samples).size <= 3
 
 
-def _is_coarse(record: _Record) -> bool:
+def _is_coarse(record: SensorRecord) -> bool:
     # Two values are a switch; a few that rarely change are a state or a command.
     if not 0.3 * record.samples.size < record.still.size < 0.95 * record.samples.size:
         return False
     return 3 <= np.unique(record.samples).size <= 16
 
 
-def _clipped(record: _Record) -> tuple[Whole, tuple[str, str]]:
-    """Give the samples beyond the range, and what to say of them."""
-    unit = record.channel.unit
-    there = _beyond_range(record)
-    if there.size:
-        reached = with_unit(f"{record.channel.overload:.6g}", unit)
-        return there, (f"reaches its range of {reached}", "use a larger range")
-    ends = {level: _plateaus(record, level) for level in (record.low, record.high) if level != 0}
-    levels = " and ".join(f"{level:.6g}" for level, there in ends.items() if there.size)
-    # A tank that is full stays at 100 %; samples alone can't tell that from a sensor at its limit.
-    told = (f"is cut off at {with_unit(levels, unit)}", "use a larger range, unless the quantity itself ends there")
-    return np.sort(np.concatenate([*ends.values()])), told
-
-
-def _beyond_range(record: _Record) -> Whole:
-    """Samples at the end of the range that is named, if one is."""
-    limit = _NEAR_OVERLOAD * (record.channel.overload or np.inf)
-    if max(record.high, -record.low) < limit:
-        return np.empty(0, dtype=np.int64)
-    return np.flatnonzero(np.abs(record.samples) >= limit)
-
-
-def _plateaus(record: _Record, level: float) -> Whole:
-    """Give the samples at an end of the range if they're cut off there, else nothing."""
-    there = np.flatnonzero(record.samples == level)
-    starts, lengths = _runs(there)
-    if lengths.size == 0 or lengths.max() < _SHORTEST_PLATEAU or _rests(record, there):
-        return there[:0]
-    others = record.samples[record.samples != level]
-    if _one_way(others):
-        return there[:0]
-    # A sine piles up at its ends as well, but no more than 2.4 times as on the next value.
-    beside = int(np.count_nonzero(others == (others.max() if level == record.high else others.min())))
-    long = lengths >= _SHORTEST_PLATEAU
-    first, last = starts[long], (starts + lengths - 1)[long]
-    entry = np.maximum(record.step(first - 1), record.step(first - 2))
-    # A record that begins at its end of the range is judged by how it leaves.
-    entry = np.where(first > 1, entry, np.maximum(record.step(last), record.step(last + 1)))
-    kinked = entry > max(0.1 * record.typical_step, 4 * record.smallest_step)
-    if _by_chance(record, there, lengths) and not np.any(entry > 6 * record.typical_step):
-        return there[:0]
-    cut_off = there.size >= 3 * beside and kinked.size > 0 and np.count_nonzero(kinked) >= 0.5 * kinked.size
-    return there if cut_off else there[:0]
-
-
-def _by_chance(record: _Record, ends: Whole, lengths: Whole) -> bool:
-    """Whether one of these runs may be as long as it is because values repeat everywhere."""
-    at_end = int(np.sum(lengths - 1))
-    repeating = (record.still.size - at_end) / max(1, record.samples.size - ends.size)
-    return bool(lengths.size * repeating ** (int(lengths.max()) - 1) > _CHANCE)
-
-
-def _one_way(samples: NDArray[np.floating]) -> bool:
-    """Whether samples never rise or never fall, as after a step that something follows slowly."""
-    steps = np.diff(samples)
-    return bool(not np.any(steps > 0) or not np.any(steps < 0))
-
-
-def _rests(record: _Record, ends: Whole) -> bool:
-    # Away from the end of the range a signal that mostly stands still is a command or a state, not a vibration.
-    at_end = int(np.count_nonzero(np.diff(ends) == 1))
-    return record.still.size - at_end > 0.5 * (record.samples.size - ends.size)
-
-
-def _held(record: _Record) -> Whole:
+def _held(record: SensorRecord) -> Whole:
     if record.still.size > 0.25 * record.samples.size:
         return record.still[:0]
-    starts, lengths = _runs(record.still)
+    starts, lengths = runs(record.still)
     long = lengths >= _shortest_hold(record) - 1
     starts, lengths = starts[long], lengths[long]
     entered = record.step(starts - 1) > 0.1 * record.typical_step
@@ -336,14 +215,14 @@ def _held(record: _Record) -> Whole:
     return _filled(starts[chosen], lengths[chosen] + 1)
 
 
-def _shortest_hold(record: _Record) -> int:
+def _shortest_hold(record: SensorRecord) -> int:
     """Samples of the same value that are hardly due to chance."""
     repeating = record.still.size / record.samples.size
     by_chance = record.samples.size * repeating ** np.arange(_SHORTEST_HOLD - 1, _SURE_HOLD - 1)
     return _SHORTEST_HOLD + int(np.count_nonzero(by_chance > _CHANCE_HELD))
 
 
-def _spikes(record: _Record) -> Whole:
+def _spikes(record: SensorRecord) -> Whole:
     if record.channel.unit == "N" or record.channel.role == "reference" or record.leaps.size < 2:
         return record.leaps[:0]
     away, back = record.leaps[:-1], record.leaps[1:]
@@ -357,12 +236,6 @@ def _spikes(record: _Record) -> Whole:
     nearby = np.maximum(record.step(away[:, None] - around), record.step(back[:, None] + around)).max(axis=1)
     chosen = (np.abs(there + again) < 0.3 * np.abs(there)) & (nearby / 4 < 0.25 * np.abs(there))
     return _filled(away[chosen] + 1, (back - away)[chosen])
-
-
-def _runs(places: Whole) -> tuple[Whole, Whole]:
-    """First of each run of consecutive whole numbers, and its length."""
-    breaks = np.flatnonzero(np.diff(places, prepend=-2) != 1)
-    return places[breaks], np.diff(breaks, append=places.size)
 
 
 def _filled(starts: Whole, lengths: Whole) -> Whole:

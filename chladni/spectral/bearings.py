@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import cos, radians
 
-from chladni.signals.errors import EstimateError
+from chladni.signals.errors import EstimateError, SetupError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,3 +64,11 @@ class Bearing:
             "BSF": self.pitch_diameter / (2 * self.element_diameter) * shaft_hz * (1 - ratio**2),
             "FTF": shaft_hz / 2 * (1 - ratio),
         }
+
+
+def fault_frequencies_hz(bearing: Bearing | None, shaft_hz: float | None) -> dict[str, float]:
+    """Give the bearing's frequencies, nothing without one; `SetupError` when only one of both is known."""
+    if (bearing is None) != (shaft_hz is None):
+        missing = "the bearing's geometry" if bearing is None else "the shaft's revolutions a second"
+        raise SetupError(f"a bearing's frequencies need its geometry and the shaft's speed; give {missing}, too")
+    return {} if bearing is None or shaft_hz is None else bearing.frequencies_hz(shaft_hz)

@@ -10,14 +10,13 @@ from chladni.io.missing_samples import MissingSamples
 from chladni.io.source import Blocks, SeriesLike, blocks_of, extent_of, log_or_series
 from chladni.signals.channel import Channel, Names
 from chladni.signals.envelope import EnvelopeSpectrum, FaultLine, Kurtogram
-from chladni.signals.errors import SetupError
 from chladni.signals.number_range import require_in_range
 from chladni.signals.peak import Peak
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.units import power
 from chladni.spectral.accumulator import AutoSpectraAccumulator
 from chladni.spectral.band_filter import BandFilter
-from chladni.spectral.bearings import Bearing
+from chladni.spectral.bearings import Bearing, fault_frequencies_hz
 from chladni.spectral.blocks import Source, leading_part
 from chladni.spectral.kurtogram import kurtogram
 from chladni.spectral.peaks import find_peaks
@@ -151,14 +150,6 @@ class BandChoice:
     kurtosis: float = nan
     kurtogram: Kurtogram | None = None
     notes: tuple[str, ...] = ()
-
-
-def fault_frequencies_hz(bearing: Bearing | None, shaft_hz: float | None) -> dict[str, float]:
-    """Give the bearing's frequencies, nothing without one; `SetupError` when only one of both is known."""
-    if (bearing is None) != (shaft_hz is None):
-        missing = "the bearing's geometry" if bearing is None else "the shaft's revolutions a second"
-        raise SetupError(f"a bearing's frequencies need its geometry and the shaft's speed; give {missing}, too")
-    return {} if bearing is None or shaft_hz is None else bearing.frequencies_hz(shaft_hz)
 
 
 def chosen_bands(source: Source, faults_hz: Mapping[str, float]) -> dict[str, BandChoice]:

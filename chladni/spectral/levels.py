@@ -1,15 +1,15 @@
 """Levels of a series or a stream of blocks: RMS, peak, crest factor, skewness and kurtosis, over all and running."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chladni.io.missing_samples import MissingSamples
 from chladni.io.source import Blocks, SeriesLike, blocks_of
-from chladni.signals.arrays import Index, Mask, Real, Whole
+from chladni.signals.arrays import Real, Whole
 from chladni.signals.channel import Channel, Names
 from chladni.signals.errors import EstimateError
 from chladni.signals.levels import Levels, RunningLevels
@@ -19,6 +19,7 @@ from chladni.spectral.accumulator import require_finite
 from chladni.spectral.averaging import require_shapes
 from chladni.spectral.band_filter import BandFilter, SharedTransforms
 from chladni.spectral.blocks import Margins, Numbers, Own, leading_part, sum_up
+from chladni.spectral.statistics import Moments, stacked
 from chladni.spectral.stretches import valid_runs
 
 # Time constant "fast" of sound and vibration level meters (IEC 61672-1:2013, section 5.8).
@@ -199,9 +200,9 @@ class LevelsAccumulator:
         samples = max(windows.samples for windows in self._windows)
         for windows in self._windows:
             windows.coarsen(samples)
-        whole = _stacked([windows.whole() for windows in self._windows])
+        whole = stacked([windows.whole() for windows in self._windows])
         require_in_range(self.channels, whole.largest[..., 0].max(axis=1))
-        one = _Moments._make(array[..., 0] for array in whole)
+        one = Moments._make(array[..., 0] for array in whole)
         return Levels(
             channels=self._passed,
             bands_hz=self._bands_hz(),
@@ -211,7 +212,7 @@ class LevelsAccumulator:
             rms_std=np.stack([windows.rms_std() for windows in self._windows], axis=1),
             peak=one.peak,
             peak_to_peak=np.where(one.samples > 0, one.high - one.low, np.nan),
-            crest_factor=_ratio(one.peak, one.rms),
+            crest_factor=one.crest_factor,
             skewness=one.skewness,
             kurtosis=one.kurtosis,
             running=self._running(samples),
@@ -232,7 +233,7 @@ class LevelsAccumulator:
 
     def _running(self, samples: int) -> RunningLevels:
         numbers = np.unique(np.concatenate([windows.number for windows in self._windows]))
-        moments = _stacked([windows.at(numbers) for windows in self._windows])
+        moments = stacked([windows.at(numbers) for windows in self._windows])
         return RunningLevels(
             window_s=samples / self.sample_rate_hz,
             time_s=(numbers + 0.5) * samples / self.sample_rate_hz,
@@ -258,9 +259,9 @@ class _Windows:
     def __init__(self, channels: int, samples: int) -> None:
         self.samples = samples
         self.number: Whole = np.empty(0, dtype=np.int64)
-        self.moments = _Moments._make(np.empty((len(_Moments._fields), channels, 0)))
+        self.moments = Moments._make(np.empty((len(Moments._fields), channels, 0)))
         # Since the last join: a join copies all windows, and short blocks are many.
-        self._fresh: list[tuple[Whole, _Moments]] = []
+        self._fresh: list[tuple[Whole, Moments]] = []
 
     def add(self, series: TimeSeries, first: int) -> None:
         """Take samples in, the first of which is number `first` of the stream."""
@@ -268,7 +269,7 @@ class _Windows:
             return
         number = np.arange(first // self.samples, (first + series.samples - 1) // self.samples + 1)
         starts = np.maximum(number * self.samples - first, 0)
-        self._fresh.append((number, _Moments.of(series.values.astype(np.float64, copy=False), series.valid, starts)))
+        self._fresh.append((number, Moments.of(series.values.astype(np.float64, copy=False), series.valid, starts)))
         if sum(number.size for number, _ in self._fresh) >= WINDOWS_TOGETHER:
             self.join()
 
@@ -276,7 +277,7 @@ class _Windows:
         """Enter what came since the last join."""
         numbers, fresh = zip((self.number, self.moments), *self._fresh, strict=True)
         self._fresh = []
-        self.moments = _Moments.joined(fresh, lambda arrays: np.concatenate(arrays, axis=-1))
+        self.moments = Moments.joined(fresh, lambda arrays: np.concatenate(arrays, axis=-1))
         self.number = np.concatenate(numbers)
         self.coarsen(self.samples)
         while self.number.size > MOST_WINDOWS:
@@ -296,7 +297,7 @@ class _Windows:
         if not whole or (size % self.samples and self.samples % size) or not np.all(np.diff(number) > 0):
             raise EstimateError("sums of a part don't fit: they have other windows; do the log anew")
         other = _Windows(moments.shape[1], size)
-        other.number, other.moments = number, _Moments._make(moments)
+        other.number, other.moments = number, Moments._make(moments)
         for one in (self, other):
             one.coarsen(max(self.samples, size))
         self._fresh.append((other.number, other.moments))
@@ -310,15 +311,15 @@ class _Windows:
             self.moments, number = self.moments.grouped(starts), number[starts]
         self.number, self.samples = number, samples
 
-    def whole(self) -> "_Moments":
+    def whole(self) -> "Moments":
         """Give the moments of all windows together, as one."""
         return self.moments.grouped(np.zeros(1, dtype=np.intp))
 
-    def at(self, numbers: Whole) -> "_Moments":
+    def at(self, numbers: Whole) -> "Moments":
         """Give windows of these numbers; those that hold no sample are empty."""
         place = np.minimum(np.searchsorted(self.number, numbers), self.number.size - 1)
         there = self.number[place] == numbers
-        return _Moments._make(np.where(there, array[..., place], 0.0) for array in self.moments)
+        return Moments._make(np.where(there, array[..., place], 0.0) for array in self.moments)
 
     def rms_std(self) -> Real:
         """Give ``[channel]`` one sigma of the RMS, by the scatter of the mean squares of parts of the record."""
@@ -333,95 +334,3 @@ class _Windows:
         # d sqrt(P) = dP / (2 sqrt(P)).
         std = np.sqrt(variance) / (2 * np.maximum(whole.rms[:, 0], np.finfo(np.float64).tiny))
         return np.asarray(np.where(number > 1, std, np.inf), dtype=np.float64)
-
-
-class _Moments(NamedTuple):
-    """Count, mean, sums of powers of deviations from the mean, and extremes: ``[..., window]`` each."""
-
-    samples: Real
-    mean: Real
-    squares: Real
-    cubes: Real
-    fourths: Real
-    low: Real
-    high: Real
-
-    @classmethod
-    def of(cls, values: Real, valid: Mask | None, starts: Index) -> Self:
-        """Take ``[channel, sample]`` in windows that begin at `starts`."""
-        lengths = np.diff(starts, append=values.shape[1])
-        low = np.minimum.reduceat(_or(values, valid, np.inf), starts, axis=1)
-        high = np.maximum.reduceat(_or(values, valid, -np.inf), starts, axis=1)
-        if valid is None:
-            count = np.broadcast_to(lengths.astype(np.float64), low.shape)
-        else:
-            count = np.add.reduceat(valid, starts, axis=1, dtype=np.float64)
-        mean = np.add.reduceat(_or(values, valid, 0.0), starts, axis=1) / np.maximum(count, 1)
-        # The mean of equal numbers may differ from them by their last bit, which is no motion.
-        mean = np.where(high > low, mean, np.where(count > 0, low, 0.0))
-        apart = _or(values - np.repeat(mean, lengths, axis=1), valid, 0.0)
-        squared = apart * apart
-        sums = (np.add.reduceat(one, starts, axis=1) for one in (squared, squared * apart, squared * squared))
-        return cls._make((count, mean, *sums, low, high))
-
-    @classmethod
-    def joined(cls, parts: Sequence[Self], join: Callable[[Sequence[Real]], Real]) -> Self:
-        """Join several by joining their arrays."""
-        return cls._make(map(join, zip(*parts, strict=True)))
-
-    def grouped(self, starts: Index) -> Self:
-        """Merge windows in groups that begin at `starts`."""
-
-        def total(terms: Real) -> Real:
-            return np.asarray(np.add.reduceat(terms, starts, axis=-1), dtype=np.float64)
-
-        low, high = np.minimum.reduceat(self.low, starts, axis=-1), np.maximum.reduceat(self.high, starts, axis=-1)
-        count = total(self.samples)
-        mean = total(self.samples * self.mean) / np.maximum(count, 1)
-        mean = np.where(high > low, mean, np.where(count > 0, low, 0.0))
-        apart = self.mean - np.repeat(mean, np.diff(starts, append=self.mean.shape[-1]), axis=-1)
-        shifted = self.samples * apart**2
-        squares = total(self.squares + shifted)
-        cubes = total(self.cubes + 3 * apart * self.squares + shifted * apart)
-        fourths = total(self.fourths + 4 * apart * self.cubes + 6 * apart**2 * self.squares + shifted * apart**2)
-        return type(self)(count, mean, squares, cubes, fourths, low, high)
-
-    @property
-    def rms(self) -> Real:
-        """Root mean square about the mean; NaN without samples."""
-        return np.sqrt(_ratio(self.squares, self.samples))
-
-    @property
-    def peak(self) -> Real:
-        """Largest magnitude about the mean; NaN without samples."""
-        return np.where(self.samples > 0, np.maximum(self.high - self.mean, self.mean - self.low), np.nan)
-
-    @property
-    def largest(self) -> Real:
-        """Largest magnitude; 0 without samples."""
-        return np.where(self.samples > 0, np.maximum(np.abs(self.high), np.abs(self.low)), 0.0)
-
-    @property
-    def skewness(self) -> Real:
-        """Third moment about the mean over the cube of the RMS; NaN where nothing moves."""
-        return _ratio(self.cubes / np.maximum(self.samples, 1), self.rms**3)
-
-    @property
-    def kurtosis(self) -> Real:
-        """Fourth moment about the mean over the fourth power of the RMS; NaN where nothing moves."""
-        return _ratio(self.fourths / np.maximum(self.samples, 1), self.rms**4)
-
-
-def _or(values: Real, valid: Mask | None, other: float) -> Real:
-    """Give the values, another one where they aren't valid."""
-    return values if valid is None else np.where(valid, values, other)
-
-
-def _stacked(bands: Sequence[_Moments]) -> _Moments:
-    """``[channel, band, window]`` of the moments of each band."""
-    return _Moments.joined(bands, lambda arrays: np.stack(arrays, axis=1))
-
-
-def _ratio(numerator: Real, denominator: Real) -> Real:
-    unknown = np.full(numerator.shape, np.nan)
-    return np.asarray(np.divide(numerator, denominator, out=unknown, where=denominator > 0), dtype=np.float64)

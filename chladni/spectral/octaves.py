@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from math import ceil, floor, log10
-from typing import Literal
 
 import numpy as np
 
@@ -19,16 +18,14 @@ from chladni.spectral.blocks import Source
 from chladni.spectral.cross_spectra import segment_average
 from chladni.spectral.leakage import leakage, named_window
 from chladni.spectral.psd import power_spectral_density
+from chladni.spectral.weighting import Weighting, weighted
 
-Weighting = Literal["A", "C"]
 # Octaves are divided in so many bands at most (IEC 61260-1:2014, table 1 of bandwidth designators ends with 1/24).
 FINEST_FRACTION = 24
 # A band of 4.6 lines or more, with a Hann window, weighs steady tones as the mask of class 1 asks.
 LINES_OF_A_BAND = 5.0
 # Segments end to end that a spectrum is averaged over, where nobody says how low bands are to go.
 SEGMENTS = 16
-# Pole frequencies of the weightings (IEC 61672-1:2013, annex E, equations E.1 to E.6).
-_POLES_HZ = (20.598997, 107.65265, 737.86223, 12194.217)
 
 # IEC 61260-1:2014: octave frequency ratio and reference frequency.
 OCTAVE = 10**0.3
@@ -120,31 +117,6 @@ def _require_fraction(fraction: int) -> None:
         raise EstimateError(
             f"octaves are divided in 1 to {FINEST_FRACTION} bands, got {fraction}; 3 gives third octaves"
         )
-
-
-def weighting_db(frequency_hz: Real, weighting: Weighting) -> Real:
-    """Give a frequency weighting of sound level meters, in dB; minus infinity at 0 Hz.
-
-    Notes
-    -----
-    IEC 61672-1:2013, annex E: C(f) = 20 lg(f4^2 f^2 / ((f^2 + f1^2)(f^2 + f4^2))) - C1000, and A(f) the same times
-    f^2 / sqrt((f^2 + f2^2)(f^2 + f3^2)); both are 0 at 1 kHz.
-
-    Examples
-    --------
-    >>> weighting_db(np.array([31.5, 100.0, 1000.0, 10_000.0]), "A").round(1) + 0.0
-    array([-39.5, -19.1,   0. ,  -2.5])
-    """
-    if weighting not in ("A", "C"):
-        raise EstimateError(f"weighting {weighting!r} is none of A, C; leave it out for none")
-
-    def gain(hz: Real) -> Real:
-        f1, f2, f3, f4 = _POLES_HZ
-        c = f4**2 * hz**2 / ((hz**2 + f1**2) * (hz**2 + f4**2))
-        return c if weighting == "C" else c * hz**2 / np.sqrt((hz**2 + f2**2) * (hz**2 + f3**2))
-
-    with np.errstate(divide="ignore"):
-        return np.asarray(20 * np.log10(gain(frequency_hz) / gain(np.array(REFERENCE_HZ))), dtype=np.float64)
 
 
 def attenuation_limits(ratio: Real, *, performance_class: int, fraction: int = 3) -> Real:
@@ -240,7 +212,7 @@ def octaves(
         source = octave_density(
             blocks_of(found, channels=channels, start_s=start_s, end_s=end_s), resolution_hz=resolution_hz
         )
-    density = source if weighting is None else _weighted(source, weighting)
+    density = source if weighting is None else weighted(source, weighting)
     frequency_hz = density.frequency_hz
     spacing_hz = float(np.median(np.diff(frequency_hz)))
     # A band narrower than a line would only repeat that line; this is the low edge of the narrowest one.
@@ -317,12 +289,6 @@ def name_of(fraction: int) -> str:
 def _relative_width(fraction: int) -> float:
     """Width of a band over its low edge."""
     return float(OCTAVE ** (1 / fraction) - 1)
-
-
-def _weighted(density: PowerSpectralDensity, weighting: Weighting) -> PowerSpectralDensity:
-    # Line by line, not band by band: a tone at the edge of a band has the weight of its own frequency.
-    power = 10 ** (weighting_db(density.frequency_hz, weighting) / 10)
-    return replace(density, values=density.values * power, std=density.std * power)
 
 
 def _class_note(bands: tuple[OctaveBand, ...], spacing_hz: float, window: Real) -> str:

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chladni.apps.frf import frf
 from chladni.apps.live import live
 from chladni.apps.live_document import EventBook, live_document, live_study
 from chladni.apps.modes import identify_modes
-from chladni.apps.spectra import frf, psd
+from chladni.apps.psd import psd
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from chladni.apps.excitation import excitation_names
+from chladni.apps.frf import frf
 from chladni.apps.modal_channels import motions_of_one_unit, responses_alone
 from chladni.apps.modes import identify_modes
 from chladni.apps.sources import Span, no_progress
-from chladni.apps.spectra import frf
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel

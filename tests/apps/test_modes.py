@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from chladni.apps.frf import frf
 from chladni.apps.modes import identify_modes
-from chladni.apps.spectra import frf
 from chladni.io.log import open_log
 from chladni.modal.experimental.circle_fit import CircleFit
 from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares

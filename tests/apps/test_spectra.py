@@ -3,8 +3,9 @@ import pytest
 from scipy import signal
 
 import chladni
+from chladni.apps.psd import densities
 from chladni.apps.sources import Span, watched_grids
-from chladni.apps.spectra import Averaging, densities
+from chladni.apps.spectra import Averaging
 from chladni.io import source
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError, LogError

@@ -9,7 +9,7 @@ from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries
 from tests.modal import truth
-from tests.spectral.test_impact_testing import FIVE, hammer_log, pulses
+from tests.spectral.test_impact import FIVE, hammer_log, pulses
 
 ASKED = re.compile(r"[Aa]sk for (?:a resolution of )?([0-9.e+-]+) Hz")
 # What can't be had by an option is asked of the next measurement.

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chladni.apps.spectra import psd
+from chladni.apps.psd import psd
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.time_series import TimeSeries

@@ -7,7 +7,7 @@ from tests.arm import FORCE, TOOL, WRIST, short_arm
 
 @pytest.fixture(scope="module")
 def response():
-    from chladni.apps.spectra import frf
+    from chladni.apps.frf import frf
     from chladni.signals.time_series import TimeSeries
 
     made = short_arm()

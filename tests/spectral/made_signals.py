@@ -3,6 +3,8 @@
 import numpy as np
 
 from chladni.signals.channel import Channel
+from chladni.signals.power_spectral_density import PowerSpectralDensity
+from chladni.signals.provenance import Provenance
 from chladni.signals.time_series import TimeSeries
 
 
@@ -44,4 +46,17 @@ def part(whole, first, last):
         channels=whole.channels,
         start_time_ns=start_ns,
         valid=valid,
+    )
+
+
+def made_density(values, *, unit="m/s^2", last_hz=2500.0, std=0.1):
+    """Densities that are given, from 0 Hz on, each known to the same share of itself."""
+    values = np.atleast_2d(values)
+    return PowerSpectralDensity(
+        frequency_hz=np.linspace(0, last_hz, values.shape[1]),
+        values=values,
+        std=std * values,
+        channels=tuple(Channel(name=f"c{row}", unit=unit) for row in range(len(values))),
+        bandwidth_hz=1.0,
+        provenance=Provenance(),
     )

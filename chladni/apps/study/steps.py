@@ -4,13 +4,15 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Final
 
 from chladni.apps.documents import Document, frf_document, psd_document
+from chladni.apps.frf import transfer
 from chladni.apps.gap_document import gap_document
 from chladni.apps.levels import levels_document, measure_levels
 from chladni.apps.modal_study import modal_study
 from chladni.apps.modes import Wanted
 from chladni.apps.modes_document import modes_document
+from chladni.apps.psd import densities
 from chladni.apps.sources import Share, Span
-from chladni.apps.spectra import Averaging, densities, transfer
+from chladni.apps.spectra import Averaging
 from chladni.io.log import Log
 from chladni.spectral.bands import within
 from chladni.spectral.peaks import find_response_peaks

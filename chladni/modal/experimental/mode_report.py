@@ -6,6 +6,7 @@ from math import pi
 import numpy as np
 
 from chladni.modal.experimental.candidates import Candidates
+from chladni.modal.experimental.cmif import complex_mode_indicator
 from chladni.modal.experimental.grouped_refinement import select_modes
 from chladni.modal.experimental.line_spacing import COARSE, lines_for, longest_modal_segment_s, nothing_found
 from chladni.modal.experimental.pruned_fit import PrunedFit
@@ -15,7 +16,7 @@ from chladni.modal.fit.modal_model import ModalModel
 from chladni.modal.fit.scaling import modal_scale
 from chladni.modal.fit.synthesis import modal_fit
 from chladni.modal.poles.stabilisation import StabilityLimits, stabilisation_diagram
-from chladni.signals.arrays import Index, Real
+from chladni.signals.arrays import Index
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.modal_fit import ModalFit
 from chladni.signals.mode_set import ModeSet
@@ -200,34 +201,3 @@ def _shortfall(count: int | None, found: int) -> tuple[str, ...]:
     return (
         f"{counted(count, 'mode')} asked for, but the data need no more than {found}: more would only follow noise",
     )
-
-
-def complex_mode_indicator(response: FrequencyResponse) -> Real:
-    """Give the singular values of H on each line; a peak of the greatest is a mode, of the second a close mode.
-
-    Parameters
-    ----------
-    response
-        Lines whose values are not finite give NaN.
-
-    Returns
-    -------
-    ndarray
-        ``[curve, frequency]`` in the functions' unit, the greatest first; as many curves as there are references or
-        responses, whichever is less.
-
-    Notes
-    -----
-    Shih, Tsuei, Allemang & Brown (1988), Mech. Syst. Signal Process. 2, 367.
-    """
-    lines = np.moveaxis(response.values, -1, 0)
-    finite = np.isfinite(lines).all(axis=(1, 2))
-    indicator = np.full((min(lines.shape[1:]), lines.shape[0]), np.nan)
-    usable = lines[finite]
-    if usable.shape[1] < usable.shape[2]:
-        usable = usable.transpose(0, 2, 1)
-    # H^H H is references x references: for hundreds of responses a hundredth of the work of a decomposition of H.
-    gram = usable.conj().transpose(0, 2, 1) @ usable
-    squares = np.linalg.eigvalsh(gram)[:, ::-1].T
-    indicator[:, finite] = np.sqrt(np.maximum(squares, 0.0))
-    return indicator

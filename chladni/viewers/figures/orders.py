@@ -1,4 +1,4 @@
-"""Order maps, order cuts with their phase, and the Campbell picture."""
+"""Order maps, and order cuts with their phase."""
 
 from collections.abc import Sequence
 
@@ -11,17 +11,14 @@ from chladni.signals.arrays import Real
 from chladni.signals.channel import labels_of
 from chladni.signals.order_spectra import OrderCuts, OrderMap
 from chladni.viewers.drawing import block_maximum, decibels_of_amplitude, phase_wraps, with_breaks
+from chladni.viewers.figures.campbell import RPM, campbell_figure, order_title
 from chladni.viewers.figures.log_axis import logarithmic
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.figures.waterfall import DYNAMIC_RANGE_DB, MISSING, PIXELS
 from chladni.viewers.labels import decibel_unit, printed_unit
 from chladni.viewers.style import ON_LIGHT
 
-RPM = 60.0
 MAP_IN, CUTS_IN = 3.0, (2.2, 1.2)
-# Circles along an order; more run into a band.
-CIRCLES = 60
-LARGEST_CIRCLE_POINTS = 14.0
 # Of the largest amplitude of a channel: below, a phase is mostly that of noise, and hides the others.
 LEAST_SHARE = 0.01
 
@@ -37,7 +34,7 @@ def order_figures(maps: Sequence[OrderMap], cuts: Sequence[OrderCuts]) -> dict[s
         for cut in cuts:
             for row, channel in enumerate(cut.channels):
                 figures[f"order cuts {labels[channel.name]}"] = _cuts_figure(cut, row, labels[channel.name])
-                figures[f"campbell {labels[channel.name]}"] = _campbell_figure(cut, row, labels[channel.name])
+                figures[f"campbell {labels[channel.name]}"] = campbell_figure(cut, row, labels[channel.name])
     return figures
 
 
@@ -78,7 +75,7 @@ def _cuts_figure(cuts: OrderCuts, row: int, label: str) -> Figure:
     draw_order_sizes(sizes, cuts, row)
     draw_order_phases(phases, cuts, row)
     phases.set_xlabel(f"{along(cuts)[1]}; phases of amplitudes above {LEAST_SHARE:.0%} of the largest")
-    _title(figure, label)
+    order_title(figure, label)
     return figure
 
 
@@ -109,44 +106,6 @@ def draw_order_phases(axes: Axes, cuts: OrderCuts, row: int) -> None:
     axes.set_ylabel("Phase [deg]")
     axes.set_ylim(-180, 180)
     axes.set_yticks([-180, -90, 0, 90, 180])
-
-
-def _campbell_figure(cuts: OrderCuts, row: int, label: str) -> Figure:
-    figure, (axes,) = sheet([3.2])
-    rpm = RPM * cuts.speed_hz
-    amplitude = np.abs(cuts.values[row])
-    largest = np.nanmax(amplitude, initial=0.0)
-    for place, order in enumerate(cuts.orders.tolist()):
-        _draw_order(axes, rpm, order, amplitude[place] / (largest or 1.0), place)
-    axes.set_xlabel("Speed [rpm]")
-    axes.set_ylabel("Frequency [Hz]")
-    unit = printed_unit(cuts.channels[row].unit)
-    _title(figure, f"{label}: the largest circle is {largest:.3g} {unit}")
-    legend(axes)
-    return figure
-
-
-def _title(figure: Figure, text: str) -> None:
-    # Above the legend, which stands where a title of the axes would.
-    figure.suptitle(plain(text), x=0.02, ha="left", fontsize=8.5)
-
-
-def _draw_order(axes: Axes, rpm: Real, order: float, share: Real, place: int) -> None:
-    colour = paint(ON_LIGHT[place % len(ON_LIGHT)])
-    ends = np.array([rpm.min(), rpm.max()])
-    axes.plot(ends, order * ends / RPM, color=colour, linewidth=0.5, label=f"order {order:g}")
-    # The widest of each step of speed, so that no peak falls between two circles.
-    step = np.digitize(rpm, np.linspace(ends[0], ends[1], CIRCLES))
-    parts = [np.flatnonzero((step == number) & np.isfinite(share)) for number in np.unique(step)]
-    chosen = [part[int(np.argmax(share[part]))] for part in parts if part.size]
-    axes.scatter(
-        rpm[chosen],
-        order * rpm[chosen] / RPM,
-        s=(LARGEST_CIRCLE_POINTS * share[chosen]) ** 2,
-        facecolors="none",
-        edgecolors=[colour],
-        linewidths=0.7,
-    )
 
 
 def along(found: OrderMap | OrderCuts) -> tuple[Real, str]:

@@ -42,17 +42,17 @@ from chladni.viewers.figures import (
     amplitude,
     cepstrum,
     correlation,
-    deflection,
-    density,
     envelope,
-    frequency_response,
+    frf,
     influence,
     levels,
     octaves,
+    ods,
     orders,
+    psd,
     random_vibration,
-    shock_response,
     sine_vibration,
+    srs,
     waterfall,
 )
 from chladni.viewers.figures.chart import chart_height_in, draw_chart
@@ -162,8 +162,8 @@ def _(value: TimeSeries) -> list[Picture]:
 @pictures.register
 def _(value: PowerSpectralDensity) -> list[Picture]:
     style = Style.of_channels(value.channels)
-    draw = partial(density.draw_densities, density=value, style=style)
-    return _of_groups(value.channels, density.HEIGHT_IN, draw, "Frequency [Hz]")
+    draw = partial(psd.draw_densities, density=value, style=style)
+    return _of_groups(value.channels, psd.HEIGHT_IN, draw, "Frequency [Hz]")
 
 
 @pictures.register
@@ -171,12 +171,12 @@ def _(value: FrequencyResponse) -> list[Picture]:
     style = Style.of_channels((*value.references, *value.responses))
     found = []
     for panel in panels(value):
-        drawn = [frequency_response.draw_magnitude, frequency_response.draw_phase]
-        if frequency_response.is_coherent(panel):
-            drawn.append(frequency_response.draw_coherence)
+        drawn = [frf.draw_magnitude, frf.draw_phase]
+        if frf.is_coherent(panel):
+            drawn.append(frf.draw_coherence)
         parts = tuple(
             Part(height_in, partial(draw, panel=panel, style=style))
-            for draw, height_in in zip(drawn, frequency_response.HEIGHTS_IN, strict=False)
+            for draw, height_in in zip(drawn, frf.HEIGHTS_IN, strict=False)
         )
         found.append(Picture(parts, "Frequency [Hz]"))
     return found
@@ -283,8 +283,8 @@ def _(value: FilteredSeries) -> list[Picture]:
 @pictures.register
 def _(value: ShockResponse) -> list[Picture]:
     style = Style.of_channels(value.channels)
-    draw = partial(shock_response.draw_shock, response=value, style=style)
-    return _of_groups(value.channels, shock_response.HEIGHT_IN, draw, shock_response.X_LABEL)
+    draw = partial(srs.draw_shock, response=value, style=style)
+    return _of_groups(value.channels, srs.HEIGHT_IN, draw, srs.X_LABEL)
 
 
 @pictures.register
@@ -335,7 +335,7 @@ def _(value: DeflectionShapes) -> list[Picture]:
     return [
         Picture(
             tuple(
-                Part(deflection.HEIGHT_IN, partial(_draw_deflection, found=value, group=group, row=row))
+                Part(ods.HEIGHT_IN, partial(_draw_deflection, found=value, group=group, row=row))
                 for row in range(value.frequency_hz.size)
             )
         )
@@ -472,8 +472,8 @@ def _draw_correlation(axes: Axes, found: CrossCorrelation, row: int, delay_s: fl
 
 def _draw_deflection(axes: Axes, found: DeflectionShapes, group: Group, row: int) -> None:
     labels = Style.of_channels(found.channels).labels
-    deflection.draw_deflection(axes, found, group, row)
-    deflection.name_channels(axes, [plain(labels[found.channels[column].name]) for column in group.rows])
+    ods.draw_deflection(axes, found, group, row)
+    ods.name_channels(axes, [plain(labels[found.channels[column].name]) for column in group.rows])
     axes.set_ylabel(f"RMS [{printed_unit(group.unit)}]")
     if row == 0:
         legend(axes, above_points=10.0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chladni.apps.live import live
-from chladni.apps.spectra import psd
+from chladni.apps.psd import psd
 from chladni.io.live.instrument import Instrument, LiveInstrument, Taken
 from chladni.io.live.reception import Samples
 from chladni.signals.channel import Channel

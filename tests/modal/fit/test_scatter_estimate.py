@@ -3,7 +3,7 @@
 import numpy as np
 
 import chladni.modal.fit.scatter_estimate
-from chladni.apps.spectra import frf
+from chladni.apps.frf import frf
 from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares
 from chladni.modal.fit.fit_covariance import SIMPLE
 from tests.modal import truth

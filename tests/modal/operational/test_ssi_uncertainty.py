@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.modal.operational.test_ssi_cov import TRUTH, exact_functions
 
 from chladni.modal.operational.correlation import correlation_functions
 from chladni.modal.operational.ssi import continuous, decompose, order_models, shapes_of
@@ -16,6 +15,7 @@ from chladni.modal.operational.ssi_uncertainty import (
     student_factor,
 )
 from chladni.signals.errors import EstimateError
+from tests.modal.operational.test_ssi import TRUTH, exact_functions
 from tests.modal.truth import ambient_record, chain
 
 

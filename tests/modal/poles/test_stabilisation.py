@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from chladni.modal.experimental.mode_report import complex_mode_indicator
+from chladni.modal.experimental.cmif import complex_mode_indicator
 from chladni.modal.poles.stabilisation import StabilityLimits, pole_status, stabilisation_diagram
 from chladni.signals.errors import SetupError
 from chladni.signals.stabilisation_diagram import POLE_STATUSES
