@@ -156,15 +156,21 @@ def kills(folder: Path, runs: int, logs: int, seed: int) -> None:
 
 
 def scale(seconds: float, logs: int, processes: bool) -> None:
-    """Sleeping logs on 1 to 64 workers: how much of their time is sleep, and what a batch costs the scheduler."""
+    """Sleeping logs on 1 to 64 workers: how much of their time they sleep, and what a batch costs the scheduler.
+
+    The model says that they are busy all the time until the scheduler's core is: with N batches of cost c, for the
+    share ``ideal / max(ideal, N c)``. Workers in one process (not ``--processes``) count their own part in c.
+    """
     from distributed import Client, LocalCluster
 
-    from chladni.apps.study.cluster import settings
+    from chladni.apps.study.cluster import quiet, settings
 
-    print("| workers | batches | a batch [s] | seconds | ideal [s] | share of ideal | a batch costs [ms] |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    print(
+        "| workers | batches | a batch [s] | seconds | ideal [s] | busy | by the model | a batch costs [ms] | load |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     options = {"processes": processes, "dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
-    with settings():
+    with quiet(), settings():
         for workers in (1, 4, 16, 64):
             with LocalCluster(n_workers=workers, threads_per_worker=1, **options) as local, Client(local) as client:
                 client.wait_for_workers(workers)
@@ -181,9 +187,12 @@ def row(client: "Client", workers: int, batch_s: float, seconds: float, count: i
     began_s, began_cpu = time.perf_counter(), time.process_time()
     batches = sum(1 for _ in engine.run([seconds] * count))
     took_s, ideal_s = time.perf_counter() - began_s, count * seconds / workers
-    cost_ms = (time.process_time() - began_cpu) / batches * 1e3
-    share = ideal_s / took_s
-    return f"| {workers} | {batches} | {batch_s} | {took_s:.1f} | {ideal_s:.1f} | {share:.2f} | {cost_ms:.1f} |"
+    cost_s = (time.process_time() - began_cpu) / batches
+    busy, by_model = ideal_s / took_s, ideal_s / max(ideal_s, batches * cost_s)
+    return (
+        f"| {workers} | {batches} | {batch_s} | {took_s:.1f} | {ideal_s:.1f} | {busy:.0%} | {by_model:.0%} "
+        f"| {cost_s * 1e3:.1f} | {os.getloadavg()[0]:.1f} |"
+    )
 
 
 if __name__ == "__main__":

@@ -16,9 +16,9 @@ from chladni.io.shared_grid import SampleGrid, several_grids
 from chladni.io.stamps import StampRequest
 from chladni.signals.channel import Channel, Names, as_names
 from chladni.signals.channel_names import require_one
-from chladni.signals.errors import EstimateError, LogError
+from chladni.signals.errors import EstimateError, LogError, SetupError
 from chladni.signals.geometry import Geometry
-from chladni.signals.time_series import TimeSeries
+from chladni.signals.time_series import Frame, TimeSeries
 
 if TYPE_CHECKING:
     from chladni.io.number_lists import NumberLists
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def open(  # noqa: A001  # as in gzip and tarfile: users write chladni.open
-    path: Path | str,
+    path: Path | str | Frame,
     *,
     setup: Setup | Path | str | None = None,
     stamp: StampRequest = "auto",
@@ -41,7 +41,7 @@ def open(  # noqa: A001  # as in gzip and tarfile: users write chladni.open
     Parameters
     ----------
     path
-        The file.
+        The file; or a data frame of pandas or polars, see `chladni.io.data_frame.open_data_frame`.
     setup
         Setup file, or what `load_setup` made of one; channels of a data file are named by their names.
     stamp
@@ -73,6 +73,13 @@ def open(  # noqa: A001  # as in gzip and tarfile: users write chladni.open
     ...     series = log.read(["/imu.linear_acceleration.x"], start_s=10, end_s=20)
     >>> open("test.csv", time_unit="ms", units={"force": "N"}).read()  # doctest: +SKIP
     """
+    rate = {} if sample_rate_hz is None else {"sample_rate_hz": sample_rate_hz}
+    if not isinstance(path, Path | str):
+        from chladni.io.data_frame import open_data_frame
+
+        if setup is not None or stamp != "auto" or limits is not None:
+            raise SetupError("setup, stamp and limits are for files; a data frame takes units= instead")
+        return open_data_frame(path, **rate | reading)
     path = Path(path)
     known = load_setup(setup) if isinstance(setup, Path | str) else setup or Setup()
     kind = file_kind(path)
@@ -85,12 +92,11 @@ def open(  # noqa: A001  # as in gzip and tarfile: users write chladni.open
     # Readers bring in numpy's and scipy's own, which a log of messages does without.
     from chladni.io.file_log import open_file
 
-    rate = {} if sample_rate_hz is None else {"sample_rate_hz": sample_rate_hz}
     return open_file(path, kind, setup=known, stamp=stamp, options=rate | reading)
 
 
 def open_log(
-    path: Path | str,
+    path: Path | str | Frame,
     *,
     setup: Setup | Path | str | None = None,
     stamp: StampRequest = "auto",

@@ -7,6 +7,7 @@ from typing import Protocol, TypeGuard, cast, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chladni.io.data_frame import has_times, is_data_frame, named_numbers
 from chladni.io.log import Log
 from chladni.io.log import open as open_log
 from chladni.signals.channel import Names, as_names, numbered, require_channels
@@ -43,10 +44,10 @@ def log_or_series(source: SeriesLike, *, sample_rate_hz: float | None = None) ->
     Parameters
     ----------
     source
-        A log, a path to one, a series, an array ``[channel, sample]`` or ``[sample]``, or arrays by their channel's
-        name.
+        A log, a path to one, a series, an array ``[channel, sample]`` or ``[sample]``, arrays by their channel's
+        name, or a data frame of pandas or polars, which becomes a log where a column or its index tells times.
     sample_rate_hz
-        Samples a second of an array, or of a file that doesn't say it.
+        Samples a second of an array, or of a file or a data frame that doesn't say it.
 
     Raises
     ------
@@ -72,6 +73,12 @@ def log_or_series(source: SeriesLike, *, sample_rate_hz: float | None = None) ->
         raise SetupError(
             f"a {type(source).__name__} holds no samples over time; give a log, a path, a series, or an array"
         )
+    if is_data_frame(source):
+        if has_times(source, sample_rate_hz=sample_rate_hz):
+            return open_log(source, sample_rate_hz=sample_rate_hz)
+        if sample_rate_hz is None:
+            raise SetupError("no column of the data frame holds times; give sample_rate_hz=, or name one time")
+        source = named_numbers(source)
     if sample_rate_hz is None:
         raise SetupError("an array doesn't tell its sample rate; give sample_rate_hz=")
     return TimeSeries.from_arrays(source, sample_rate_hz=sample_rate_hz)

@@ -283,14 +283,23 @@ def _columns(frame: Frame) -> dict[str, ArrayLike]:
     names = [str(name) for name in frame.columns]
     if len(set(names)) != len(names):
         raise EstimateError(f"channel names must be unique, got {', '.join(names)}")
-    return {name: frame[column] for name, column in zip(names, frame.columns, strict=True)}
+    try:
+        return {name: frame[column] for name, column in zip(names, frame.columns, strict=True)}
+    except TypeError:
+        # A lazy frame of polars has names and no numbers.
+        raise EstimateError(
+            f"a {type(frame).__name__} holds no numbers yet; give what .collect() makes of it"
+        ) from None
 
 
 def _channel(name: object, values: ArrayLike) -> NDArray[np.floating]:
     try:
-        return _real(values).ravel()
+        array = _real(values)
     except EstimateError as error:
         raise EstimateError(f"{name}: {error}") from None
+    if array.size > max(array.shape, default=1):
+        raise EstimateError(f"{name}: values have shape {array.shape}, but a channel by its name must be [sample]")
+    return array.ravel()
 
 
 def _real(values: ArrayLike | Iterable[ArrayLike]) -> NDArray[np.floating]:

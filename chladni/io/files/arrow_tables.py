@@ -44,7 +44,7 @@ def is_text(kind: "pa.DataType") -> bool:
     """Whether a column holds text."""
     import pyarrow.types as kinds
 
-    return bool(kinds.is_string(kind) or kinds.is_large_string(kind))
+    return bool(kinds.is_string(kind) or kinds.is_large_string(kind) or kinds.is_string_view(kind))
 
 
 def _is_flat(kind: "pa.DataType") -> bool:

@@ -74,7 +74,7 @@ def read_arrow(
         if metadata.get("format") == SERIES_FORMAT:
             own = _own(table, metadata.get("series", ""), str(path))
             return joined([told, FileContents(series=restated([own], units, where=str(path)))])
-        columns, unread = _columns(table, metadata, budget)
+        columns, unread = arrow_columns(table, metadata, budget)
     # Names and texts are decoded when they're looked at.
     except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
         raise LogError(f"{path}: this Arrow file can't be read: {one_line(error)}") from error
@@ -142,10 +142,10 @@ def _own(table: "pa.Table", text: str, where: str) -> TimeSeries:
         raise LogError(f"{where}: the description of its series is damaged: {error}") from error
 
 
-def _columns(
+def arrow_columns(
     table: "pa.Table", metadata: Mapping[str, str], budget: Budget
 ) -> tuple[list[Column], tuple[tuple[str, str], ...]]:
-    """Give the columns of numbers, times and text, and why others are none."""
+    """Give the columns of numbers, times and text of an Arrow table, and why others are none."""
     import pyarrow as pa
 
     by_name = _units_by_name(metadata)

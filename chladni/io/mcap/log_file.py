@@ -15,8 +15,16 @@ from chladni.signals.wording import near_words
 _WINDOW_BYTES = 4 * 1024
 # What people open by mistake, by the first bytes, and what helps.
 _OTHER_FORMATS = (
-    (b"#ROSBAG", "a ROS 1 bag; convert it with 'mcap convert in.bag out.mcap'"),
-    (b"SQLite format 3\0", "a ROS 2 .db3 bag; convert it with 'mcap convert in.db3 out.mcap'"),
+    (
+        b"#ROSBAG",
+        "a ROS 1 bag; 'rosbags-convert --src in.bag --dst out --dst-storage mcap' (pip install rosbags) "
+        "writes an MCAP log of it",
+    ),
+    (
+        b"SQLite format 3\0",
+        "a ROS 2 .db3 bag; 'rosbags-convert --src FOLDER --dst out --dst-storage mcap' "
+        "(pip install rosbags) writes an MCAP log of the folder that it's in",
+    ),
     (b"\x1f\x8b", "a file compressed with gzip; unpack it with gunzip first"),
     (b"\x28\xb5\x2f\xfd", "a file compressed with zstd; unpack it with 'zstd -d' first"),
     (b"\x04\x22\x4d\x18", "a file compressed with lz4; unpack it with 'lz4 -d' first"),

@@ -18,8 +18,8 @@ from tests.io.mcap import log_bytes
 @pytest.mark.parametrize(
     ("content", "hint"),
     [
-        (b"#ROSBAG V2.0\n" + bytes(50), "a ROS 1 bag; convert it with 'mcap convert in.bag out.mcap'"),
-        (b"SQLite format 3\0" + bytes(50), "a ROS 2 .db3 bag; convert it"),
+        (b"#ROSBAG V2.0\n" + bytes(50), "a ROS 1 bag; 'rosbags-convert --src in.bag --dst out"),
+        (b"SQLite format 3\0" + bytes(50), "a ROS 2 .db3 bag; 'rosbags-convert --src FOLDER"),
         (gzip.compress(b"log", mtime=0), "gzip; unpack it with gunzip"),
         (zstandard.compress(b"log" * 10), "zstd; unpack it with 'zstd -d'"),
         (lz4.frame.compress(b"log" * 10), "lz4; unpack it with 'lz4 -d'"),
