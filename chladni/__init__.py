@@ -68,7 +68,7 @@ _HOME = {
     "CircleFit": "chladni.modal.experimental.circle_fit",
     "HalfPower": "chladni.modal.experimental.half_power",
     "PolyReferenceLeastSquares": "chladni.modal.experimental.polyreference",
-    "unit_modal_mass_shapes": "chladni.modal.fit.scaling",
+    "unit_modal_mass_shapes": "chladni.modal.fit.modal_mass",
     "EnhancedFrequencyDomainDecomposition": "chladni.modal.operational.efdd",
     "FrequencyDomainDecomposition": "chladni.modal.operational.fdd",
     "machine_harmonics": "chladni.modal.operational.harmonics",
@@ -273,7 +273,7 @@ if TYPE_CHECKING:
     from chladni.modal.experimental.circle_fit import CircleFit as CircleFit
     from chladni.modal.experimental.half_power import HalfPower as HalfPower
     from chladni.modal.experimental.polyreference import PolyReferenceLeastSquares as PolyReferenceLeastSquares
-    from chladni.modal.fit.scaling import unit_modal_mass_shapes as unit_modal_mass_shapes
+    from chladni.modal.fit.modal_mass import unit_modal_mass_shapes as unit_modal_mass_shapes
     from chladni.modal.operational.efdd import (
         EnhancedFrequencyDomainDecomposition as EnhancedFrequencyDomainDecomposition,
     )

@@ -65,11 +65,11 @@ def make_decoder(*, message_encoding: str, schema_name: str, schema_encoding: st
 
             return BinaryDecoder(parse_ros1_text(schema_name, definition_text(schema_data)), encapsulated=False)
         case "protobuf", "protobuf":
-            from chladni.io.decoding.protobuf_messages import ProtobufDecoder
+            from chladni.io.decoding.protobuf import ProtobufDecoder
 
             return ProtobufDecoder.of_schema(schema_name, schema_data)
         case "json", _:
-            from chladni.io.decoding.json_messages import JsonDecoder
+            from chladni.io.decoding.json import JsonDecoder
 
             # Messages in JSON name their fields themselves, so a schema in another language isn't needed.
             return JsonDecoder.of_schema(schema_name, schema_data if schema_encoding == "jsonschema" else b"")

@@ -13,17 +13,13 @@ from chladni.signals.visible import visible
 from chladni.signals.wording import near_words
 
 _WINDOW_BYTES = 4 * 1024
+_CONVERTED = "rosbags-convert --src {} --dst out --dst-storage mcap"
 # What people open by mistake, by the first bytes, and what helps.
 _OTHER_FORMATS = (
-    (
-        b"#ROSBAG",
-        "a ROS 1 bag; 'rosbags-convert --src in.bag --dst out --dst-storage mcap' (pip install rosbags) "
-        "writes an MCAP log of it",
-    ),
+    (b"#ROSBAG", f"a ROS 1 bag; '{_CONVERTED.format('in.bag')}' (pip install rosbags) writes an MCAP log of it"),
     (
         b"SQLite format 3\0",
-        "a ROS 2 .db3 bag; 'rosbags-convert --src FOLDER --dst out --dst-storage mcap' "
-        "(pip install rosbags) writes an MCAP log of the folder that it's in",
+        f"a ROS 2 .db3 bag; '{_CONVERTED.format('FOLDER')}' (pip install rosbags) writes an MCAP log of its folder",
     ),
     (b"\x1f\x8b", "a file compressed with gzip; unpack it with gunzip first"),
     (b"\x28\xb5\x2f\xfd", "a file compressed with zstd; unpack it with 'zstd -d' first"),

@@ -12,8 +12,8 @@ from chladni.modal.experimental.line_spacing import COARSE, lines_for, longest_m
 from chladni.modal.experimental.pruned_fit import PrunedFit
 from chladni.modal.fit.fitted_modes import FittedModes
 from chladni.modal.fit.lsfd import least_squares_frequency_domain
+from chladni.modal.fit.modal_mass import modal_scale
 from chladni.modal.fit.modal_model import ModalModel
-from chladni.modal.fit.scaling import modal_scale
 from chladni.modal.fit.synthesis import modal_fit
 from chladni.modal.poles.stabilisation import StabilityLimits, stabilisation_diagram
 from chladni.signals.arrays import Index

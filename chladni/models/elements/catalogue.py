@@ -8,7 +8,7 @@ from chladni.models.elements.corrections import CORRECTIONS
 from chladni.models.elements.electrical import ELECTRICAL
 from chladni.models.elements.element import Element, ElementKind
 from chladni.models.elements.mechanical import MECHANICAL
-from chladni.models.elements.regulators import REGULATORS
+from chladni.models.elements.pid import REGULATORS
 from chladni.signals.errors import ModelError
 from chladni.signals.wording import near_words
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from chladni.io.decoding import json_messages as module
+from chladni.io.decoding import json as module
 from chladni.io.decoding import make_decoder
 from chladni.signals.errors import LogError
 from tests.io.decoding.encoded import batch_of, decode_all, values_of

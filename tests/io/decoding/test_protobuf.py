@@ -10,7 +10,8 @@ from google.protobuf.descriptor_pool import DescriptorPool
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chladni.io.decoding import make_decoder, protobuf_messages
+from chladni.io.decoding import make_decoder
+from chladni.io.decoding import protobuf as module
 from chladni.signals.errors import LogError
 from tests.io.decoding.encoded import batch_of, decode_all, values_of
 
@@ -52,8 +53,8 @@ def descriptor_set() -> descriptor_pb2.FileDescriptorSet:
         sample.field.add(name=name, number=len(sample.field) + 1, type=kind, label=label, type_name=type_name or None)
     found = descriptor_pb2.FileDescriptorSet()
     found.file.append(file)  # before what it imports: the order isn't guaranteed
-    for module in (timestamp_pb2, duration_pb2):
-        module.DESCRIPTOR.CopyToProto(found.file.add())
+    for known in (timestamp_pb2, duration_pb2):
+        known.DESCRIPTOR.CopyToProto(found.file.add())
     return found
 
 
@@ -177,10 +178,8 @@ def varied(rng: np.random.Generator, layout: int):
 
 def test_a_shared_layout_is_not_read_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     read = []
-    original = protobuf_messages._Batch._read
-    monkeypatch.setattr(
-        protobuf_messages._Batch, "_read", lambda self, rows: (read.extend(rows), original(self, rows))[1]
-    )
+    original = module._Batch._read
+    monkeypatch.setattr(module._Batch, "_read", lambda self, rows: (read.extend(rows), original(self, rows))[1])
     messages = [filled(2 * index).SerializeToString() for index in range(50)]
     decoded = PLAIN_DECODER.columns(batch_of(messages), ["accel.x", "stamp", "samples"])
     assert values_of(decoded, "accel.x") == [0.1 + 2 * index for index in range(50)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.modal.fit.maximum_likelihood import refine
-from chladni.modal.fit.scaling import modal_scale, unit_modal_mass_shapes
+from chladni.modal.fit.modal_mass import modal_scale, unit_modal_mass_shapes
 from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.signals.channel import Channel
 from chladni.signals.errors import EstimateError

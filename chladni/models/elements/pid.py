@@ -1,4 +1,4 @@
-"""Regulators: PI, PID, and the PID whose derivative is filtered."""
+"""PID regulators: PI, PID, and the PID whose derivative is filtered."""
 
 from chladni.models.core.parameter import Parameters
 from chladni.models.elements import declare
