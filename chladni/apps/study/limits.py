@@ -77,8 +77,8 @@ def judge(now: Trends, limits: "Sequence[LimitTable]", before: Trends | None = N
     now
         The study.
     limits
-        Tables ``[[limit]]`` of its recipe: each value of each log must keep to ``low`` and ``high``; the level since
-        the last change must keep within ``change_percent`` of the earlier study's.
+        Tables ``[[limit]]`` of its recipe: each value of each log must keep to ``low`` and ``high``, however few logs
+        show it; the level since the last change must keep within ``change_percent`` of the earlier study's.
     before
         The earlier study, or None. What no limit with ``change_percent`` names must differ from it by no more than
         chance explains.
@@ -92,10 +92,10 @@ def judge(now: Trends, limits: "Sequence[LimitTable]", before: Trends | None = N
     missing: list[str] = []
     checked = 0
     for limit in limits:
-        meant = [one for one in now.trends if _is_meant(limit, one)]
+        meant = [one for one in (*now.trends, *now.seldom) if _is_meant(limit, one)]
         checked += len(meant)
         if not meant:
-            missing.append(f"no log has what [[limit]] of {_words(limit)} is about")
+            missing.append(f"[[limit]] of {_words(limit)}: no log shows it, so it isn't checked")
         outside += [found for one in meant for found in _beyond(limit, one)]
     if before is not None:
         compared = [_counterpart(one, now.trends) for one in before.trends]

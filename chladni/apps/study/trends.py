@@ -1,7 +1,7 @@
 """Modes, levels, lines and causes of a study, followed over its logs."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -40,6 +40,8 @@ class Trends:
     ----------
     trends
         Modes first, then damping, levels, lines, causes.
+    seldom
+        What too few logs show to be followed. Nothing is fitted to it; limits hold for it all the same.
     logs
         Number of logs that were read.
     notes
@@ -48,6 +50,7 @@ class Trends:
 
     trends: tuple[Trend, ...]
     logs: int
+    seldom: tuple[Trend, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -60,6 +63,7 @@ class _Points:
     unit: str
     channel: str = ""
     near_hz: float = 0.0
+    often: bool = True
     values: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
@@ -82,13 +86,14 @@ def follow(found: StudyResults, asked: "TrendTable") -> Trends:
         *_lines(found, number),
         *_causes(found, number),
     ]
-    trends = [_trend(one, logs, covariates) for one in points]
+    trends = [_trend(one, logs, covariates) for one in points if one.often]
+    seldom = tuple(_values(one, logs) for one in points if not one.often and one.values)
     short = sum(len(one.logs) < LEAST_TO_CHANGE for one in trends)
     if short:
         notes.append(
             f"{counted(short, 'trend')} of fewer than {LEAST_TO_CHANGE} logs: too few to tell a change from scatter"
         )
-    return Trends(trends=tuple(trends), logs=len(logs), notes=tuple(notes))
+    return Trends(trends=tuple(trends), logs=len(logs), seldom=seldom, notes=tuple(notes))
 
 
 def _in_time(found: StudyResults) -> list[Row]:
@@ -137,12 +142,17 @@ def _modes(found: StudyResults, number: Mapping[str, int], asked: "TrendTable") 
         [_seen(rows[log]) for log in logs], farthest=asked.widest_percent / 100, least_mac=asked.least_mac
     )
     kept = [track for track in tracks if _often(len(track.sightings), len(logs))]
+    others = [track for track in tracks if not _often(len(track.sightings), len(logs))]
     for kind, unit, key, std in (
         ("mode", "Hz", "frequency_hz", "frequency_std_hz"),
         ("damping", "1", "damping_ratio", "damping_std"),
     ):
         for place, track in enumerate(kept, 1):
             yield _of_track(track, logs, rows, kind=kind, name=f"mode {place}", unit=unit, key=key, std=std)
+        for track in others:
+            found_seldom = _of_track(track, logs, rows, kind=kind, name="mode", unit=unit, key=key, std=std)
+            found_seldom.often = False
+            yield found_seldom
 
 
 def _of_track(
@@ -183,7 +193,9 @@ def _levels(found: StudyResults, number: Mapping[str, int]) -> Iterator[_Points]
                 kind="level", name=name, unit=row["unit"], channel=key[0], near_hz=(key[1] + key[2]) / 2
             )
         groups[key].values[number[row["log"]]] = _with_std(row["rms"], row["rms_std"])
-    yield from (one for _, one in sorted(groups.items()) if len(one.values) >= LEAST_LOGS)
+    for _, one in sorted(groups.items()):
+        one.often = len(one.values) >= LEAST_LOGS
+        yield one
 
 
 def _lines(found: StudyResults, number: Mapping[str, int]) -> Iterator[_Points]:
@@ -193,9 +205,9 @@ def _lines(found: StudyResults, number: Mapping[str, int]) -> Iterator[_Points]:
             channels.setdefault(row["channel"], {}).setdefault(number[row["log"]], []).append(row)
     for channel, logs in sorted(channels.items()):
         for track in sorted(_line_tracks(logs), key=lambda one: one.near_hz):
-            if _often(len(track.values), len(logs)):
-                track.name, track.channel = f"{channel}, line at {track.near_hz:.4g} Hz", channel
-                yield track
+            track.often = _often(len(track.values), len(logs))
+            track.name, track.channel = f"{channel}, line at {track.near_hz:.4g} Hz", channel
+            yield track
 
 
 def _line_tracks(logs: Mapping[int, Sequence[Row]]) -> list[_Points]:
@@ -236,14 +248,10 @@ def _with_std(value: float, std: float | None) -> tuple[float, float]:
     return value, np.inf if std is None else std
 
 
-def _trend(points: _Points, logs: Sequence[Row], covariates: Sequence[_Covariate]) -> Trend:
+def _values(points: _Points, logs: Sequence[Row]) -> Trend:
+    """Give the values in the order of time, with nothing fitted to them."""
     order = sorted(points.values)
-    values = np.array([points.values[log][0] for log in order])
-    std = np.array([points.values[log][1] for log in order])
-    # A covariate that is missing in one of its logs, or never moves, explains nothing.
-    known = [one for one in covariates if np.isfinite(one.means[order]).all() and np.ptp(one.means[order]) > 0]
-    fit = find_steps(values, std=std, covariates=[one.means[order] for one in known] if known else None)
-    left_out = [one.channel for one in covariates if one not in known]
+    values, std = (np.array([points.values[log][place] for log in order]) for place in (0, 1))
     return Trend(
         kind=points.kind,
         name=points.name,
@@ -254,6 +262,21 @@ def _trend(points: _Points, logs: Sequence[Row], covariates: Sequence[_Covariate
         times_ns=np.array([logs[log]["ns"] for log in order], dtype=np.int64),
         values=values,
         std=std,
+        expected=np.full(values.size, values.mean()),
+        explained=np.zeros(values.size),
+        scatter=np.inf,
+    )
+
+
+def _trend(points: _Points, logs: Sequence[Row], covariates: Sequence[_Covariate]) -> Trend:
+    plainly, order = _values(points, logs), sorted(points.values)
+    # A covariate that is missing in one of its logs, or never moves, explains nothing.
+    known = [one for one in covariates if np.isfinite(one.means[order]).all() and np.ptp(one.means[order]) > 0]
+    explaining = [one.means[order] for one in known] if known else None
+    fit = find_steps(plainly.values, std=plainly.std, covariates=explaining)
+    left_out = [one.channel for one in covariates if one not in known]
+    return replace(
+        plainly,
         expected=fit.expected,
         explained=fit.explained,
         scatter=fit.scatter,
@@ -269,7 +292,7 @@ def _trend(points: _Points, logs: Sequence[Row], covariates: Sequence[_Covariate
             for one, slope, slope_std in zip(known, fit.slopes, fit.slopes_std, strict=True)
         ),
         notes=tuple(f"{name} isn't known in all of these logs, and is left out" for name in left_out),
-    )  # fmt: skip
+    )
 
 
 def trend_sentences(trends: Iterable[Trend], *, unit: Callable[[str], str] = str) -> tuple[str, ...]:

@@ -25,14 +25,15 @@ def pages(count: int, size: int) -> Iterator[tuple[str, range]]:
 
 
 def panes(count: int, *, columns: int, height_in: float, **options: Any) -> tuple[Figure, list[Axes]]:
-    """Make a figure of `count` axes in rows of `columns`; places that are left over stay white."""
-    columns = min(columns, count)
+    """Make a figure of `count` axes in as few rows as `columns` allow, even ones; places left over stay white."""
     rows = -(-count // columns)
+    columns = -(-count // rows)
     figure = Figure(figsize=(WIDTH_IN, rows * height_in + 0.35), layout="constrained")
     stack = list(figure.subplots(rows, columns, squeeze=False, **options).flat)
     for axes in stack[count:]:
         axes.remove()
-    # Shared axes are numbered in the last row only, which some columns don't reach.
-    for axes in stack[max(count - columns, 0) : count]:
-        axes.tick_params(labelbottom=True)
+    # Shared axes are numbered in the last row only, which some columns don't reach; and all frames are of one height.
+    if count < rows * columns:
+        for axes in stack[:count]:
+            axes.tick_params(labelbottom=True)
     return figure, stack[:count]

@@ -1,9 +1,10 @@
-"""Waveforms: one axes for each channel, the same scale for channels of one unit."""
+"""Waveforms: one axes for each channel, the same scale for channels of one known unit."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chladni.signals.channel import UNKNOWN
 from chladni.signals.study import Study
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.viewers.drawing import thin
@@ -35,7 +36,8 @@ def waveform_figures(study: Study) -> dict[str, Figure]:
 
 
 def _figure(series: TimeSeries, group: Group, style: Style, points: int) -> Figure:
-    figure, stack = sheet([0.9] * len(group.rows), sharex=True, sharey=True)
+    # Of a unit that isn't known nobody knows that it's the same in two channels: a hammer would hide the response.
+    figure, stack = sheet([0.9] * len(group.rows), sharex=True, sharey=group.unit != UNKNOWN)
     for axes, row in zip(stack, group.rows, strict=True):
         _draw(axes, series, row, style, points)
     start_s = (series.start_time_ns - style.origin_ns) / NS_PER_S

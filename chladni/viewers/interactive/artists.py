@@ -437,8 +437,9 @@ def _draw_text(axes: Axes, target: Target, text: Text, names: list[float]) -> No
     aside = "right" if inside or (upright and not up) else text.get_horizontalalignment()
     if aside == "center" and not upright:
         aside = "left" if share < NAME_SHARE / 2 else "right" if share > 1 - NAME_SHARE / 2 else aside
-    # Inside the top of the frame, where it stands above it on paper.
-    baseline = text.get_verticalalignment() if up else ("middle" if upright else "top")
+    # Inside the top of the frame, where it stands above it on paper; an upright one beside its line.
+    beside = "top" if share < NAME_SHARE / 3 else "bottom"
+    baseline = text.get_verticalalignment() if up else (beside if upright else "top")
     look |= {
         "x": float(target.along([place_x])[0]),
         "y": float(target.up([y])[0]) if up else top,
@@ -446,6 +447,7 @@ def _draw_text(axes: Axes, target: Target, text: Text, names: list[float]) -> No
         "text_baseline": _BASELINES.get(baseline, baseline),
         "y_range_name": target.range_name,
         "y_offset": 0 if up else -3,
+        "x_offset": 0 if up or not upright else 2 if beside == "top" else -2,
     }
     target.plot.add_layout(Label(**look))
 

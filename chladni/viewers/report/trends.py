@@ -16,8 +16,8 @@ from chladni.viewers.report.markup import page as whole_page
 from chladni.viewers.report.pictures import Pictures
 
 _CAPTION: Final = (
-    "Blue: each log, with one sigma, what covariates explain taken off. Pale: as measured. Black: the level. Red: a "
-    "change, and shaded the logs between which it lies (95 %)."
+    "Points with a bar: each log with one sigma, what covariates explain taken off. Pale points: as measured. "
+    "Line: the level. Shaded: the logs between which a change lies (95 %)."
 )
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 

@@ -26,11 +26,13 @@ DAYS, DAMAGED, LOUD = 200, 120, 160
 HOUR_NS = 3600 * 10**9
 
 
-def write_year(out: Path, *, seed: int = 0, damage: float = 0.006, louder: float = 0.6, shift: float = 0.0) -> None:
+def write_year(
+    out: Path, *, seed: int = 0, damage: float = 0.006, louder: float = 0.6, shift: float = 0.0, days: int = DAYS
+) -> None:
     """Write the tables of a study of a log a day: two modes near each other, one of them often missed."""
     rng = np.random.default_rng(seed)
     rows: dict[str, list[dict[str, Any]]] = {"logs": [], "modes": [], "levels": [], "peaks": []}
-    for day in range(DAYS):
+    for day in range(days):
         begins = START_NS + day * HOUR_NS
         start = {"log": f"/bridge/{day:03d}.mcap", "day": datetime.fromtimestamp(begins / 1e9, UTC).date()}
         warm = 12 * np.sin(2 * np.pi * day / DAYS) + 3 * rng.standard_normal()
@@ -119,6 +121,24 @@ def test_a_limit_tells_each_value_beyond_it(followed: Trends) -> None:
     assert not judge(followed, [LimitTable(of="level", channel="/tip.x", high=3.0)]).outside
     [sentence] = judge(followed, [LimitTable(of="mode", near_hz=17.0, low=1.0)]).missing
     assert "mode near 17 Hz" in sentence
+
+
+def test_limits_hold_for_what_too_few_logs_show_to_be_followed(tmp_path: Path) -> None:
+    write_year(tmp_path / "two", days=2)
+    found = follow(chladni.results(tmp_path / "two"), TrendTable())
+    assert not found.trends
+    limits = [
+        LimitTable(of="level", channel="/tip.x", high=0.5),
+        LimitTable(of="mode", near_hz=4.0, low=4.1),
+        LimitTable(of="damping", near_hz=4.0, high=0.005),
+        LimitTable(of="line", channel="/tip.x", near_hz=50.0, high=60.0),
+    ]
+    verdict = judge(found, limits)
+    assert not verdict.missing
+    told = {(row.what, row.log) for row in verdict.outside}
+    for what in ("RMS of /tip.x, 0.5 to 20 Hz", "mode (", "damping of mode ("):
+        assert {log for said, log in told if said.startswith(what)} == {"/bridge/000.mcap", "/bridge/001.mcap"}
+    assert not [said for said, _ in told if "line" in said]
 
 
 def test_an_equal_baseline_is_within_its_band_and_another_isnt(followed: Trends, tmp_path: Path) -> None:
