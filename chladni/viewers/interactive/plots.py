@@ -106,6 +106,10 @@ def translated(figure: Figure, *, cells: int) -> Translated:
     heights: dict[int, int] = {}
     for plot, row, *_ in children:
         heights[row] = max(heights.get(row, 0), plot.height)
+    for plot, row, _, rows, _ in children:
+        # Beside a plot that has a legend above, others end at the same line.
+        if rows == 1:
+            plot.height = heights[row]
     return Translated(grid=grid, height=sum(heights.values()) + 30, width=SQUARE if square else None)
 
 

@@ -140,12 +140,16 @@ def _again(view: rrb.View, signals: GapSignals, row: int) -> rrb.View:
 
 
 def _tabbed(views: Sequence[rrb.View | rrb.Container]) -> rrb.Container:
-    """Behind tabs, of which so many as fit into a window are in a row."""
+    """Behind tabs, of which so many as fit into a window are in a row; a row is called by its first and last."""
     if len(views) <= TABS:
         return rrb.Tabs(*views, active_tab=0)
-    starts = range(0, len(views), TABS)
-    parts = [(f"{start + 1}–{min(start + TABS, len(views))}", views[start : start + TABS]) for start in starts]
-    return rrb.Tabs(*(rrb.Tabs(*part, active_tab=0, name=name) for name, part in parts), active_tab=0)
+    parts = [views[start : start + TABS] for start in range(0, len(views), TABS)]
+    return rrb.Tabs(*(rrb.Tabs(*part, active_tab=0, name=_ends(part)) for part in parts), active_tab=0)
+
+
+def _ends(views: Sequence[rrb.View | rrb.Container]) -> str:
+    names = [str(one.name).partition(" [")[0] for one in views]
+    return names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"
 
 
 def _forces(recording: rr.RecordingStream, surfaces: Sequence[RestoringForce]) -> list[rrb.Container]:

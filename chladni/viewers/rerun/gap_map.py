@@ -26,7 +26,8 @@ def draw_gap_maps(recording: rr.RecordingStream, signals: GapSignals | None) -> 
         "after": _level(signals.gap_map_after[:, shown]),
     }
     known = np.concatenate([level[np.isfinite(level)] for level in levels.values()])
-    high = float(np.ceil(known.max())) if known.size else 0.0
+    # Plus nothing, since a zero with a minus would be written as one.
+    high = float(np.ceil(known.max())) + 0.0 if known.size else 0.0
     names = (f"time {_span(signals.map_time_s)} s", f"frequency {_span(signals.map_frequency_hz[shown])} Hz")
     told = f" · {band}" if (band := band_told(signals)) else ""
     return [_draw(recording, what, level, high, names, told) for what, level in levels.items()]
