@@ -11,11 +11,12 @@ from chladni.models.core.port import Port
 from chladni.models.effects.attaching import LawAtPort
 from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
-from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers, positive, rms
+from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, positive, rms
 from chladni.signals.arrays import Real
 
-#: Angles in degrees at which a spring may stand; at 90 it's a cube, near 0 it hardly turns.
-_ANGLES_DEG = (30.0, 60.0, 90.0, 120.0, 150.0)
+#: Angles in degrees at which a spring may stand: at 90 it's a cube, near 0 it hardly turns, at 63 and 117 the cube
+#: changes its sign.
+_ANGLES_DEG = (30.0, 60.0, 75.0, 90.0, 105.0, 120.0, 150.0)
 #: Share of its force beside a straight line below which it's a spring along the joint.
 _STRAIGHT = 0.02
 
@@ -39,24 +40,23 @@ def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
 
 
 def _trials(motion: TrialMotion) -> Iterator[Trial]:
-    yield from (_trial(motion, float(np.radians(angle))) for angle in _ANGLES_DEG)
-
-
-def _trial(motion: TrialMotion, angle: float) -> Trial:
     d, reach = motion.displacement, rms(motion.displacement)
 
     def build(shape: Shape) -> Force:
-        length = numbers(shape)[0]
+        length, angle = np.exp(shape[0]), shape[1]
         along = length * np.cos(angle) + d
         stretched = np.maximum(np.hypot(along, length * np.sin(angle)), 1e-9 * length)
         return Force.of(motion.spectrum((stretched - length) * along / stretched - np.cos(angle) ** 2 * d))
 
     def values(shape: Shape, a: Real) -> Numbers | None:
-        return positive(a, stiffness=a[0], length=numbers(shape)[0], angle=angle)
+        # A spring that stands the other way round, or is turned by a whole turn, is the same.
+        angle = float(np.arccos(np.cos(shape[1])))
+        return positive(a, stiffness=a[0], length=float(np.exp(shape[0])), angle=angle)
 
-    # From a spring that turns over to one that only begins to turn.
-    grid = logarithms((reach * np.geomspace(2.0, 30.0, 5)).tolist())
-    return Trial(build=build, grid=grid, values=values, parameters=3)
+    # From a spring that turns over to one that only begins to turn. The length alone, at a wrong angle, runs away.
+    lengths = np.log(reach * np.geomspace(2.0, 30.0, 5)).tolist()
+    grid = tuple((length, float(np.radians(angle))) for length in lengths for angle in _ANGLES_DEG)
+    yield Trial(build=build, grid=grid, values=values, parameters=3)
 
 
 def _is_degenerate(fitted: FittedForm) -> bool:

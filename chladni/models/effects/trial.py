@@ -10,7 +10,7 @@ from chladni.models.core.port import Port, PortKind
 from chladni.signals.arrays import Complex, Real
 
 Numbers = Mapping[str, float]
-#: Logarithms of what enters an effect's law nonlinearly.
+#: What enters an effect's law nonlinearly: logarithms, but for angles and the like.
 Shape = tuple[float, ...]
 
 
@@ -49,7 +49,7 @@ class Trial:
     variant, source
         As `chladni.attached` takes them.
     build
-        ``build(shape)`` gives the force along the known motion; `shape` holds logarithms.
+        ``build(shape)`` gives the force along the known motion, see `Shape`.
     grid
         Shapes to begin with: one that is empty when nothing enters nonlinearly.
     values
