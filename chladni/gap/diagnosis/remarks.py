@@ -40,12 +40,27 @@ def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Dist
         )
     if causes.distorted:
         found.append(f"{', '.join(causes.distorted)}: what is left follows its own signal in a curve or in steps")
+    found += _constants(study, causes, shown)
     if shown.fit.undetermined:
         found.append(_undetermined(shown.fit.undetermined))
     if np.any(causes.noise.upper_bound):
         found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
     found += _of_black_box(study, shown)
     return (*found, *filter(None, [_stability(study, shown)]), *_of_distortion(study.measurement, distortion))
+
+
+def _constants(study: Study, causes: Causes, shown: Contestant) -> list[str]:
+    """Constants larger than the noise beside them: every fit leaves them free, so that nothing else would tell."""
+    measurement = study.measurement
+    rows = zip(
+        measurement.output_names, measurement.output_units, shown.fit.offsets.tolist(), causes.noise.rms, strict=True
+    )
+    return [
+        f"{name} is {value:+.3g} {unit} beside the model all the time: an offset of the sensor, gravity or a tilt; "
+        "no cause is looked for in a constant"
+        for name, unit, value, noise in rows
+        if abs(value) > noise
+    ]
 
 
 def _of_black_box(study: Study, shown: Contestant) -> list[str]:
