@@ -148,8 +148,14 @@ class Belief:
         best: dict[Causes, Contestant] = {}
         for one in sorted(self._contestants, key=self.nats, reverse=True):
             best.setdefault(frozenset(one.hypothesis.named), one)
-        best = {causes: one for causes, one in best.items() if not self._has_idle(causes, best)}
-        nats = np.array([self.nats(one) for one in best.values()])
+        credit = {causes: self.nats(one) for causes, one in best.items()}
+        for causes in sorted(best, key=len, reverse=True):
+            # A cause that does hardly anything has no name, but what it makes of the others is theirs.
+            fewer = self._without_idle(causes, best)
+            own = credit.pop(causes) if fewer else -np.inf
+            credit.update({one: max(credit[one], own) for one in fewer})
+        best = {causes: best[causes] for causes in credit}
+        nats = np.array([*credit.values()])
         unknown = self._unknown()
         top = max(float(nats.max()), unknown)
         weight = np.exp((nats - top) / TEMPER)
@@ -165,15 +171,15 @@ class Belief:
         """Energy that a cause must explain: a share of what values alone, right or wrong, leave."""
         return LEAST_SHARE * min(self.beyond(one) for one in self._contestants if not one.hypothesis.effects)
 
-    def _has_idle(self, causes: Causes, best: Mapping[Causes, Contestant]) -> bool:
-        """Whether a set leaves hardly less than the same without one of its causes.
+    def _without_idle(self, causes: Causes, best: Mapping[Causes, Contestant]) -> list[Causes]:
+        """Sets that lack one of the causes and leave hardly more than all of them do.
 
         A word at several sites is one cause: each of them could do a part of what the others do.
         """
         words = Counter(one.effect for one in causes)
         alone = [one for one in causes if words[one.effect] == 1 or one.effect == PARAMETER]
-        fewer = [best[causes - {one}] for one in alone if causes - {one} in best]
-        return any(self.beyond(one) - self.beyond(best[causes]) < self.least for one in fewer)
+        fewer = [causes - {one} for one in alone if causes - {one} in best]
+        return [one for one in fewer if self.beyond(best[one]) - self.beyond(best[causes]) < self.least]
 
     def _unknown(self) -> float:
         return float(np.logaddexp.reduce([self.anywhere, *(self.unknown_at(one) for one in self._places)]))

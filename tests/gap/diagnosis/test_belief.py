@@ -131,6 +131,17 @@ def test_a_cause_that_does_nothing_is_none_where_one_floor_is_too_high() -> None
     assert {one.effect for one in belief.sets[0].causes} == {LAG.kind.name}
 
 
+def test_what_an_idle_cause_makes_of_another_one_is_that_one_s() -> None:
+    # A third word imitates the pair; without its second cause, too small for a name, the first one is worse than it.
+    nothing = contestant(left=leaving(500.0), log_evidence=-600.0)
+    lag, both = contestant(LAG, left=leaving(4.0), log_evidence=-300.0), contestant(LAG, RUB, left=leaving(1.0))
+    belief = Belief(location(), [nothing, lag, both, contestant(DELAY, left=leaving(1.3), log_evidence=-150.0)])
+    assert belief.sets[0].best is lag
+    assert belief.sets[0].causes == {Candidate(effect="lag", site=LAG.site)}
+    assert belief.sets[0].nats == pytest.approx(belief.nats(both))
+    assert all(len(one.causes) < 2 for one in belief.sets)
+
+
 def test_a_fit_tells_the_noise_as_far_as_the_floor_allows_and_else_the_floor_does() -> None:
     most = 1.0 + 2.0 * DOUBT
     assert Belief(location(), [contestant(left=leaving_all(most - 0.01))]).level == pytest.approx(most - 0.01)
