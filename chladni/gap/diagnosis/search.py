@@ -34,7 +34,7 @@ from chladni.gap.explanation.hypotheses import (
     twins,
 )
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
-from chladni.gap.explanation.linear_words import linear_hypotheses
+from chladni.gap.explanation.linear_words import linear_beside, linear_elsewhere, linear_hypotheses
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.explanation.sticking import sticking_hypotheses
 from chladni.gap.explanation.wrong_values import with_wrong_values, wrong_values
@@ -133,6 +133,7 @@ class Search:
         candidates, hypotheses = self._one_cause(progress)
         if self.is_open and self._other_holds() and self.is_open:
             candidates, hypotheses = self._one_cause(progress)
+        self._linear_pairs()
         if self.is_open and self.best.hypothesis.freed:
             # Where an unknown force acts shows only behind the values that are wrong.
             self.add(second_causes(self.study, self.best))
@@ -217,8 +218,27 @@ class Search:
         progress(0.3)
         hypotheses = effect_hypotheses(candidates, count=FITS)
         values = wrong_values(location, study.contest.run.tunables)
-        self.enter([*hypotheses, *values], lambda done: progress(0.3 + 0.4 * done))
+        elsewhere = linear_elsewhere(study.model, location, study.kinds)
+        self.enter([*hypotheses, *elsewhere, *values], lambda done: progress(0.3 + 0.4 * done))
         return candidates, hypotheses
+
+    def _linear_pairs(self) -> None:
+        """Fit a linear word beside each of the best ones, which a third word's details may have imitated both of.
+
+        A pair that leaves noise alone is worth its price beside any word that leaves more than that.
+        """
+        study = self.study
+        for lead in self._linear_leads():
+            if -self.best.left.at(self.belief.level).log_likelihood > WORTH - self.belief.word:
+                kept, z = lead.fit.effects, lead.fit.z
+                self.enter(linear_beside(study.model, study.location, study.kinds, kept, z, self.best.chi))
+
+    def _linear_leads(self) -> list[Contestant]:
+        """The best linear words that explain half of the gap at least, in decades."""
+        enough = np.sqrt(max(self.best.chi, 1.0) * self.nothing.chi)
+        found = [one.best for one in self.belief.sets if one.best.hypothesis.effects and one.best.chi < enough]
+        linear = [one for one in found if all(effect.kind.linear for effect in one.hypothesis.effects)]
+        return [] if self.study.contest.run.is_black_box else linear[:LEADS]
 
     def _hidden_forms(self, candidates: Sequence[Screened], hypotheses: Sequence[Hypothesis]) -> None:
         """Fit forms that the screen ranks low though they're right: linear ones far off, laws whose runs are lost."""

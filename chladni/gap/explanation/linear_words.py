@@ -1,25 +1,30 @@
 """Linear effects beside the parameters of a model, fitted where both are linear: over segments first."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
-from chladni.gap.calibration import FAR, FORMS, LOCATED, ROUNDING, WIDE
+from chladni.gap.calibration import FAR, FORMS, LESS, LITTLE, LOCATED, ROUNDING, SHARE_OF_RANGE, WIDE
 from chladni.gap.explanation.hypotheses import effect_of, hypothesis_of
 from chladni.gap.explanation.hypothesis import Hypothesis
-from chladni.gap.explanation.screen import Screened
+from chladni.gap.explanation.screen import Regression, Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
-from chladni.gap.location.profile import Profile, profiled
+from chladni.gap.location.profile import Elimination, Profile, profiled
 from chladni.gap.plant.black_box import BlackBox
 from chladni.gap.plant.further_numbers import with_further
 from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.places import sites_of
+from chladni.gap.side_by_side import side_by_side
 from chladni.gap.tuning.effect_scale import effect_numbers, with_numbers
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
-from chladni.models.effects.attached_effect import AttachedEffect
-from chladni.signals.arrays import Real
+from chladni.models.effects.attached_effect import AttachedEffect, attached_if_possible
+from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.effects.pair import pairs_of
+from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
 
 
@@ -114,3 +119,141 @@ def _moved(effect: AttachedEffect, further: Real) -> AttachedEffect:
     low, high = np.array([one.low for one in numbers]), np.array([one.high for one in numbers])
     steps = np.clip(WIDE * further, low + ROUNDING * np.abs(low), high - ROUNDING * np.abs(high))
     return with_numbers((effect,), numbers, steps)[0]
+
+
+def linear_elsewhere(model: Model, location: Location, kinds: Sequence[EffectKind]) -> list[Hypothesis]:
+    """Fit linear effects where no place that was followed tells of them, as their first step promises; the best.
+
+    An unknown force is no bound on every effect: a gyroscopic coupling is no force between two bodies, and a force is
+    taken to be band-limited, which what a held reference makes of a gain inside its loop isn't.
+
+    Parameters
+    ----------
+    model
+        Of the location's problem.
+    kinds
+        Effects that take part.
+    """
+    if isinstance(model, BlackBox):
+        return []
+    followed = {name for one in location.ranked for place in one.places for name in place.names}
+    scores = _Scores(model, location.problem, location.tuned)
+    found = _promised(scores, location, kinds, followed | scores.open_ended, LESS * location.tuned.chi)
+    return [hypothesis_of((one.effect,), one.z, screened=one.chi) for one in found]
+
+
+def linear_beside(
+    model: Model,
+    location: Location,
+    kinds: Sequence[EffectKind],
+    kept: tuple[AttachedEffect, ...],
+    z: Real,
+    enough: float,
+) -> list[Hypothesis]:
+    """Fit linear effects beside those that are kept, as far as their first step promises; the best.
+
+    Parameters
+    ----------
+    model
+        Of the location's problem.
+    kinds
+        Effects that take part.
+    kept
+        Linear ones.
+    z
+        ``[parameter]`` of their fit.
+    enough
+        Misfit over what noise alone leaves that they must come below.
+    """
+    beside = model.with_effects((*model.effects, *kept))
+    old = location.problem
+    problem = LinearProblem(beside, old.measurement, old.noise, old.tunables, old.lines)
+    scores = _Scores(beside, problem, profiled(problem, (), z))
+    found = _promised(scores, location, kinds, {one.site for one in kept}, enough)
+    return [hypothesis_of((*kept, one.effect), one.z, screened=one.chi) for one in found]
+
+
+def _promised(
+    scores: "_Scores", location: Location, kinds: Sequence[EffectKind], taken: Collection[str], enough: float
+) -> list[LinearFit]:
+    """Fit the first few of the effects whose first step promises to come lower; those that come below a misfit."""
+    tried = [(kind, site) for kind in kinds if kind.linear for site in scores.sites(kind, taken)]
+    promised = [one for one in side_by_side(lambda one: scores.weighed(*one), tried) if one is not None]
+    worth = [one for one in sorted(promised, key=lambda one: one[1]) if one[0].chi < LESS * scores.chi][:FORMS]
+    found = [fitted_beside(scores.model, location, one.effect, one.z) for one, _ in worth]
+    return sorted((one for one in found if one is not None and one.chi < enough), key=lambda one: one.chi)
+
+
+class _Scores:
+    """What little of an effect prints, beside the parameters: as a parameter's slope that's known without any force.
+
+    The score test of Rao (1948). Effects that begin at nothing have one.
+    """
+
+    def __init__(self, model: Model, problem: LinearProblem, tuned: Profile) -> None:
+        self.model, self.problem, self.chi = model, problem, tuned.chi
+        self._plain = self.problem.view(tuned.z)
+        self._out = Elimination([], self.problem.transients(self._plain))
+        self._forced = self._plain.forced()
+        self._size = float(np.linalg.norm(self._forced * self.problem.weight))
+        rest = self._out.rest((self.problem.measured - self._forced) * self.problem.weight)
+        slopes = self._out.rest(self.problem.slopes(tuned.z, tuned.transient, ()))
+        self._regression = Regression(rest, slopes, tuned.z, self.problem.limits(tuned.z))
+
+    @property
+    def open_ended(self) -> set[str]:
+        """Outputs that nothing listens to: an error there is any signal."""
+        ports = {port.name for port in self._plain.compiled.ports}
+        return set(self.problem.measurement.output_names) - ports
+
+    def sites(self, kind: EffectKind, taken: Collection[str]) -> list[str]:
+        """Where an effect may act that begins at nothing, but for sites that are taken."""
+        if not kind.required or not set(kind.required) <= set(kind.neutral):
+            return []
+        compiled = self._plain.compiled
+        if kind.clues.between_linked:
+            return pairs_of(compiled, "pair")
+        sites = sites_of(compiled, self.problem.measurement.output_names)
+        return [site.name for site in sites if site.kind in kind.sites and site.name not in taken]
+
+    def weighed(self, kind: EffectKind, site: str) -> tuple[LinearFit, float] | None:
+        """Give the effect of the size that its first step promises, with its cost; None where it promises nothing."""
+        columns = {name: one for name in kind.neutral if (one := self._column(kind, site, name)) is not None}
+        found: list[tuple[LinearFit, float]] = []
+        for count in range(1, len(columns) + 1):
+            for names in combinations(columns, count):
+                sizes, misfit, z = self._regression.solved(np.array([columns[name] for name in names]))
+                values = {
+                    **kind.neutral,
+                    **{name: kind.neutral[name] + one for name, one in zip(names, sizes, strict=True)},
+                }
+                effect = attached_if_possible(kind, site, values)
+                if effect is not None:
+                    cost = misfit + float(z @ z) / 2 + 0.5 * count * float(np.log(self.problem.scale))
+                    found.append((LinearFit(effect=effect, z=z, chi=misfit / self.problem.scale), cost))
+        return min(found, key=lambda one: one[1], default=None)
+
+    def _column(self, kind: EffectKind, site: str, name: str) -> Real | None:
+        """``[number]`` what one more of a number prints where it does nothing yet; None where that is nothing."""
+        parameter = kind.parameters_of().require(name)
+        step = SHARE_OF_RANGE * (parameter.high - parameter.low)
+        for _ in range(2):
+            printed = self._printed(kind, site, {**kind.neutral, name: kind.neutral[name] + step})
+            size = 0.0 if printed is None else float(np.linalg.norm(printed))
+            if printed is None or not 0.0 < size < np.inf:
+                return None
+            if size < LITTLE**2 * self._size:
+                break
+            # So little that it's a straight line.
+            step *= LITTLE**3 * self._size / size
+        return self._out.rest(printed) / step
+
+    def _printed(self, kind: EffectKind, site: str, values: Mapping[str, float]) -> Complex | None:
+        effect = attached_if_possible(kind, site, values)
+        if effect is None:
+            return None
+        tunables, z = self.problem.tunables, self._regression.z
+        with suppress(ModelError):
+            model = self.model.with_values(tunables.values(z)).with_effects((*self.model.effects, effect))
+            return (self.problem.beside(z, model.compile()).forced() - self._forced) * self.problem.weight
+        return None

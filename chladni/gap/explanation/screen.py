@@ -54,6 +54,73 @@ class Screened:
         )
 
 
+class Regression:
+    """Least squares of columns on a residual, with the parameters refitted beside them.
+
+    Parameters
+    ----------
+    rest
+        ``[number]`` the residual, whitened.
+    slopes
+        ``[parameter, number]`` of the parameters.
+    z
+        ``[parameter]`` where these are, in units of their tolerance.
+    limit
+        Bounds on them.
+    """
+
+    def __init__(self, rest: Real, slopes: Real, z: Real, limit: float | Real) -> None:
+        self.rest, self.slopes, self.z, self.limit = rest, slopes, z, limit
+        # Parameters with their prior are eliminated once; each trial then costs a few inner products. Scaled, and
+        # with a floor on what nothing determines: beside a transient that runs away slopes may be of any size.
+        normal = slopes @ slopes.T + np.eye(len(slopes)) / 2
+        self._size = np.sqrt(np.diag(normal))
+        scaled = normal / self._size / self._size[:, None] + RIDGE * np.eye(len(slopes))
+        self._factor = cho_factor(scaled) if len(slopes) else None
+
+    def solved(self, basis: Real, rest: Real | None = None) -> tuple[Real, float, Real]:
+        """Give the amplitudes of ``[column, number]``, the misfit that they leave, and the parameters with them.
+
+        Parameters
+        ----------
+        rest
+            ``[number]`` by default that of the regression.
+        """
+        rest = self.rest if rest is None else rest
+        size = np.linalg.norm(basis, axis=1)
+        unit = basis[size > 0] / size[size > 0, None]
+        own, to_slopes, cross = unit @ rest, self.slopes @ rest - self.z / 2, self.slopes @ unit.T
+        shift, moved = self._eliminated(cross), self._eliminated(to_slopes)
+        scaled = np.linalg.lstsq(unit @ unit.T - cross.T @ shift, own - cross.T @ moved, rcond=RANK)[0]
+        step = moved - shift @ scaled
+        if np.any(np.abs(self.z + step) > self.limit):
+            scaled, step = self._bounded(unit, rest)
+        left = rest - scaled @ unit - step @ self.slopes
+        amplitudes = np.zeros(len(basis))
+        amplitudes[size > 0] = scaled / size[size > 0]
+        return amplitudes, float(left @ left), self.z + step
+
+    def _eliminated(self, toward: Real) -> Real:
+        """Best step of the parameters toward ``[parameter]`` or ``[parameter, column]``."""
+        if self._factor is None:
+            return np.zeros_like(toward)
+        scale = self._size if toward.ndim == 1 else self._size[:, None]
+        return np.asarray(cho_solve(self._factor, toward / scale) / scale, dtype=np.float64)
+
+    def _bounded(self, unit: Real, rest: Real) -> tuple[Real, Real]:
+        """Amplitudes and step of the parameters where these may not leave their tolerance."""
+        both = np.vstack([unit, self.slopes])
+        count, size = len(unit), len(self.slopes)
+        free = np.concatenate([np.zeros(count), np.full(size, 0.5)])
+        normal = both @ both.T + np.diag(free) + RIDGE * np.eye(count + size)
+        toward = both @ rest
+        toward[count:] -= self.z / 2
+        low = np.concatenate([np.full(count, -np.inf), -self.limit - self.z])
+        high = np.concatenate([np.full(count, np.inf), self.limit - self.z])
+        found = bounded_minimum(normal, toward, low, high)
+        return found[:count], found[count:]
+
+
 class Screen:
     """Regression of a residual on the forces of trials at one site.
 
@@ -85,17 +152,11 @@ class Screen:
         self._held = HeldSite(problem, found.z, site, others)
         forces = list(zip(found.sites, found.forces, strict=True))
         slopes = self._held.out.rest(problem.slopes(found.z, found.transient, forces))
-        self._slopes = slopes
-        # Parameters with their prior are eliminated once; each trial then costs a few inner products. Scaled, and
-        # with a floor on what nothing determines: beside a transient that runs away slopes may be of any size.
-        normal = slopes @ slopes.T + np.eye(len(slopes)) / 2
-        self._size = np.sqrt(np.diag(normal))
-        scaled = normal / self._size / self._size[:, None] + RIDGE * np.eye(len(slopes))
-        self._factor = cho_factor(scaled) if len(slopes) else None
+        self._regression = Regression(self._held.rest, slopes, found.z, limit)
 
     def nothing(self) -> float:
         """Misfit and prior without any force."""
-        return self._solved(np.zeros((0, self._held.rest.size)), self._held.rest)[1]
+        return self._regression.solved(np.zeros((0, self._held.rest.size)))[1]
 
     def run(self, trials: Iterable[SiteTrial]) -> list[Screened]:
         """Weigh trials on their grids; those whose amplitudes make no such effect are left out."""
@@ -132,43 +193,9 @@ class Screen:
         # A law that ran away along the recovered motion prints nothing that could be weighed.
         if not (np.all(np.abs(basis) < RUNAWAY) and np.all(np.abs(rest) < RUNAWAY)):
             return None
-        amplitudes, misfit, z = self._solved(basis, rest)
+        amplitudes, misfit, z = self._regression.solved(basis, rest)
         values = trial.form.values(shape, amplitudes)
         if values is None or not np.all(np.isfinite(list(values.values()))):
             return None
         expected = float(self.problem.scale)
         return Screened(trial=trial, shape=shape, values=values, misfit=misfit, expected=expected, z=z)
-
-    def _solved(self, basis: Real, rest: Real) -> tuple[Real, float, Real]:
-        size = np.linalg.norm(basis, axis=1)
-        unit = basis[size > 0] / size[size > 0, None]
-        own, to_slopes, cross = unit @ rest, self._slopes @ rest - self.z / 2, self._slopes @ unit.T
-        shift, moved = self._eliminated(cross), self._eliminated(to_slopes)
-        scaled = np.linalg.lstsq(unit @ unit.T - cross.T @ shift, own - cross.T @ moved, rcond=RANK)[0]
-        step = moved - shift @ scaled
-        if np.any(np.abs(self.z + step) > self.limit):
-            scaled, step = self._bounded(unit, rest)
-        left = rest - scaled @ unit - step @ self._slopes
-        amplitudes = np.zeros(len(basis))
-        amplitudes[size > 0] = scaled / size[size > 0]
-        return amplitudes, float(left @ left), self.z + step
-
-    def _eliminated(self, toward: Real) -> Real:
-        """Best step of the parameters toward ``[parameter]`` or ``[parameter, column]``."""
-        if self._factor is None:
-            return np.zeros_like(toward)
-        scale = self._size if toward.ndim == 1 else self._size[:, None]
-        return np.asarray(cho_solve(self._factor, toward / scale) / scale, dtype=np.float64)
-
-    def _bounded(self, unit: Real, rest: Real) -> tuple[Real, Real]:
-        """Amplitudes and step of the parameters where these may not leave their tolerance."""
-        both = np.vstack([unit, self._slopes])
-        count, size = len(unit), len(self._slopes)
-        free = np.concatenate([np.zeros(count), np.full(size, 0.5)])
-        normal = both @ both.T + np.diag(free) + RIDGE * np.eye(count + size)
-        toward = both @ rest
-        toward[count:] -= self.z / 2
-        low = np.concatenate([np.full(count, -np.inf), -self.limit - self.z])
-        high = np.concatenate([np.full(count, np.inf), self.limit - self.z])
-        found = bounded_minimum(normal, toward, low, high)
-        return found[:count], found[count:]

@@ -67,6 +67,8 @@ class Clues:
         Whether one machine part is often several of them at one site: a cable has more modes than one.
     is_loop
         Whether the force remembers: where a function of displacement and velocity explains as much, it's another.
+    between_linked
+        Whether it may also act between two bodies that share a joint: there a spring is none that a model lacks.
     timed
         Whether it happens at a time of its own, so that only the whole log shows it.
     nested
@@ -93,6 +95,7 @@ class Clues:
     exact: bool = False
     several: bool = False
     is_loop: bool = False
+    between_linked: bool = False
     timed: bool = False
     nested: Callable[[FittedForm], Iterable[Relative]] | None = None
     resisting: Callable[[float, float], Numbers] | None = None

@@ -40,7 +40,7 @@ GYROSCOPIC = EffectKind(
     ),
     neutral={"coefficient": 0.0},
     linear=True,
-    clues=Clues(trials=_no_trials, sizes=("coefficient",), exact=True),
+    clues=Clues(trials=_no_trials, sizes=("coefficient",), exact=True, between_linked=True),
     variants=(
         Variant(name="skew", attach=attach, formula="f_first = -coefficient s_2, f_second = coefficient s_1"),
     ),

@@ -6,7 +6,7 @@ import chladni
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.explanation.candidates import screened
-from chladni.gap.explanation.linear_words import linear_hypotheses
+from chladni.gap.explanation.linear_words import linear_beside, linear_elsewhere, linear_hypotheses
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
@@ -49,3 +49,29 @@ def test_and_named() -> None:
     assert found.verdict == "effect"
     assert (found.causes[0].effect, found.causes[0].site) == ("added_mass", "wrist")
     assert found.gap.closed > 0.99
+
+
+def test_a_coupling_that_is_no_force_at_any_one_place_is_found_by_its_first_step() -> None:
+    log = measured((chladni.attached("gyroscopic", "column~wrist", {"coefficient": 60.0}),))
+    location = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
+    best = linear_elsewhere(arm(), location, WORDS)[0]
+    (effect,) = best.effects
+    assert (effect.effect, effect.site) == ("gyroscopic", "column~wrist")
+    assert effect.values["coefficient"] == pytest.approx(60.0, rel=0.05)
+    assert best.screened < 1.1
+
+
+def test_nothing_is_fitted_elsewhere_where_the_model_is_right() -> None:
+    log = measured()
+    location = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
+    assert linear_elsewhere(arm(), location, WORDS) == []
+
+
+def test_a_second_linear_word_is_found_beside_a_first_one() -> None:
+    late = chladni.attached("time_offset", "acc_arm", {"offset": 8e-4})
+    load = chladni.attached("added_mass", "wrist", {"mass": 1.5})
+    log = measured((late, load))
+    location = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
+    best = linear_beside(arm(), location, WORDS, (late,), location.tuned.z, location.tuned.chi)[0]
+    assert [(one.effect, one.site) for one in best.effects] == [("time_offset", "acc_arm"), ("added_mass", "wrist")]
+    assert best.effects[1].values["mass"] == pytest.approx(1.5, rel=0.1)
