@@ -81,8 +81,8 @@ def _sentences(found: Diagnosis) -> Iterator[str]:
             yield from _moved(found)
         case "unknown":
             yield from _unknown(found) if found.machine is None else robot_unknown(found)
-    # Where nothing was named, nothing closes.
-    if found.verdict in ("effect", "parameters"):
+    # Where nothing was named, or added, nothing closes.
+    if found.verdict == "parameters" or (found.verdict == "effect" and found.gap.after != found.gap.tuned):
         yield from _closed(found.gap)
         yield from _elsewhere(found)
     yield from _how(found)
@@ -148,6 +148,9 @@ def _certainty(cause: Cause) -> str:
 
 def _closing(found: Diagnosis) -> str:
     gap = found.gap
+    if gap.after == gap.tuned:
+        # What a sensor's own samples tell, steps and constants, changes no run.
+        return f"Beside {'it' if len(found.causes) == 1 else 'them'}, {_agreement(gap)}."
     subject = "It explains" if len(found.causes) == 1 else "Together they explain"
     explained = "" if gap.explained is None else f"{subject} {percent(gap.explained)} {_LEFT_BY_TUNING}; "
     adding = "adding it brings" if len(found.causes) == 1 else "adding them brings"

@@ -31,7 +31,17 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
         found += [one for one in told if one.probability >= NAMED]
     if causes.verdict == "effect" and study.stepping is not None:
         found += _in_steps(study, study.stepping, {one.site for one in found if one.effect == study.stepping.name})
+    if causes.verdict == "effect" and causes.best is causes.tuned and study.of_constant is not None:
+        found += _constants(study, study.of_constant, study.constants(causes.tuned.fit, causes.noise))
     return tuple(found)
+
+
+def _constants(study: Study, kind: EffectKind, constants: Mapping[str, float]) -> list[Cause]:
+    (name,) = kind.required
+    return [
+        _plain(kind.name, site, UNWEIGHED, numbers={name: FittedNumber(value=one, std=None, unit=_unit(study, site))})
+        for site, one in constants.items()
+    ]
 
 
 def _in_steps(study: Study, kind: EffectKind, taken: Collection[str]) -> list[Cause]:

@@ -50,16 +50,13 @@ def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Dist
 
 
 def _constants(study: Study, causes: Causes, shown: Contestant) -> list[str]:
-    """Constants larger than the noise beside them: every fit leaves them free, so that nothing else would tell."""
-    measurement = study.measurement
-    rows = zip(
-        measurement.output_names, measurement.output_units, shown.fit.offsets.tolist(), causes.noise.rms, strict=True
-    )
+    """Constants that get no name: beside another cause they may have any reason."""
+    units = dict(zip(study.measurement.output_names, study.measurement.output_units, strict=True))
     return [
-        f"{name} is {value:+.3g} {unit} beside the model all the time: an offset of the sensor, gravity or a tilt; "
-        "no cause is looked for in a constant"
-        for name, unit, value, noise in rows
-        if abs(value) > noise
+        f"{name} is {value:+.3g} {units[name]} beside the model all the time: an offset of the sensor, gravity or a "
+        "tilt; it counts for nothing in this answer"
+        for name, value in study.constants(shown.fit, causes.noise).items()
+        if shown is not causes.tuned or study.of_constant is None
     ]
 
 

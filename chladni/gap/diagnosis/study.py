@@ -82,6 +82,16 @@ class Study:
         """The effect that samples themselves show by standing on a lattice."""
         return _stepping(self.kinds)
 
+    @property
+    def of_constant(self) -> EffectKind | None:
+        """The effect that is a constant of an output, when it takes part."""
+        return next((kind for kind in self.kinds if kind.clues.of_constant), None)
+
+    def constants(self, fit: OutputErrorFit, noise: NoiseFloor) -> dict[str, float]:
+        """Constants of outputs that a fit left free and that are larger than the noise, by name."""
+        rows = zip(self.measurement.output_names, fit.offsets.tolist(), noise.rms.tolist(), strict=True)
+        return {name: value for name, value, rms in rows if abs(value) > rms}
+
     def takes_part(self, word: str) -> bool:
         """Whether an effect is one of those that are looked for."""
         return any(kind.name == word for kind in self.kinds)

@@ -118,7 +118,9 @@ def judged(search: Search) -> Causes:
     within_step = verdict == "effect" and _within_step(study, tuned, best)
     verdict = "unknown" if within_step else verdict
     shaken = shaken_by(study, tuned) if verdict == "unknown" else None
-    if shaken is not None or (verdict == "none" and study.lattices):
+    noise = study.contest.noise.lowered(best.held)
+    told_anyway = study.lattices or (study.of_constant is not None and study.constants(tuned.fit, noise))
+    if shaken is not None or (verdict == "none" and told_anyway):
         verdict = "effect"
     distorted = _distorted(study, tuned) if verdict in ("none", "unknown") else ()
     if verdict == "none" and (study.repeating or distorted):
@@ -133,7 +135,7 @@ def judged(search: Search) -> Causes:
         best=told,
         belief=belief,
         shaken=shaken,
-        noise=study.contest.noise.lowered(best.held),
+        noise=noise,
         distorted=distorted,
         within_step=within_step,
         forces=search.forces,

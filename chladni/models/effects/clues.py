@@ -81,6 +81,8 @@ class Clues:
         the model's parameters.
     possible
         ``possible(recorded, values)`` says whether an output that errs so may have recorded these samples.
+    of_constant
+        Whether it's a constant of an output, which every fit leaves free. No fit weighs it then.
     in_samples
         ``in_samples(signal)`` finds it in the samples of an output themselves. No fit weighs it then.
     of_force
@@ -101,5 +103,6 @@ class Clues:
     resisting: Callable[[float, float], Numbers] | None = None
     doubts: Callable[[str, Numbers, Parameters], Iterable[str]] | None = None
     possible: Callable[[Real, Numbers], bool] | None = None
+    of_constant: bool = False
     in_samples: Callable[[Real], Lattice | None] | None = None
     of_force: Callable[[Real, float], Numbers] | None = None

@@ -27,7 +27,7 @@ def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
 
 
 def _no_trials(_motion: object) -> tuple[()]:
-    # Of a log the mean is taken away, of outputs that a model doesn't hold at rest with reason: gravity, charge.
+    # Every fit leaves the constants of outputs free, which have other reasons too: gravity, charge.
     return ()
 
 
@@ -46,7 +46,7 @@ OFFSET = EffectKind(
         )
     ),
     neutral={"value": 0.0},
-    clues=Clues(trials=_no_trials, sizes=("value",), exact=True),
+    clues=Clues(trials=_no_trials, sizes=("value",), exact=True, of_constant=True),
     variants=(
         Variant(
             name="constant",
