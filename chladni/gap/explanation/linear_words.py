@@ -237,23 +237,22 @@ class _Scores:
         """``[number]`` what one more of a number prints where it does nothing yet; None where that is nothing."""
         parameter = kind.parameters_of().require(name)
         step = SHARE_OF_RANGE * (parameter.high - parameter.low)
-        for _ in range(2):
-            printed = self._printed(kind, site, {**kind.neutral, name: kind.neutral[name] + step})
-            size = 0.0 if printed is None else float(np.linalg.norm(printed))
-            if printed is None or not 0.0 < size < np.inf:
-                return None
-            if size < LITTLE**2 * self._size:
-                break
+        printed = self._printed(kind, site, {**kind.neutral, name: kind.neutral[name] + step})
+        size = float(np.linalg.norm(printed))
+        if size > LITTLE**2 * self._size and np.isfinite(size):
             # So little that it's a straight line.
             step *= LITTLE**3 * self._size / size
-        return self._out.rest(printed) / step
+            printed = self._printed(kind, site, {**kind.neutral, name: kind.neutral[name] + step})
+        size = float(np.linalg.norm(printed))
+        return self._out.rest(printed) / step if 0.0 < size < np.inf else None
 
-    def _printed(self, kind: EffectKind, site: str, values: Mapping[str, float]) -> Complex | None:
-        effect = attached_if_possible(kind, site, values)
-        if effect is None:
-            return None
+    def _printed(self, kind: EffectKind, site: str, values: Mapping[str, float]) -> Complex:
+        """Whitened ``[output, segment, line]`` of an effect; zero where there's none of these numbers."""
         tunables, z = self.problem.tunables, self._regression.z
+        effect = attached_if_possible(kind, site, values)
         with suppress(ModelError):
-            model = self.model.with_values(tunables.values(z)).with_effects((*self.model.effects, effect))
-            return (self.problem.beside(z, model.compile()).forced() - self._forced) * self.problem.weight
-        return None
+            effects = () if effect is None else (effect,)
+            model = self.model.with_values(tunables.values(z)).with_effects((*self.model.effects, *effects))
+            moved = self.problem.beside(z, model.compile()).forced() - self._forced
+            return np.asarray(moved * self.problem.weight, dtype=np.complex128)
+        return np.zeros_like(self._forced)
