@@ -222,11 +222,11 @@ class Contest:
         deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return dict(zip(self._tolerated, zip(values.tolist(), deviations.tolist(), strict=True), strict=True))
 
-    def together(self, fit: Fit, weights: Mapping[str, float]) -> tuple[float, float]:
-        """Give what a fit says of a weighted sum of numbers in their tolerances: value and standard deviation."""
-        weight = np.array([weights.get(name, 0.0) for name in self._tolerated])
+    def together(self, fit: Fit, weights: Sequence[Mapping[str, float]]) -> tuple[Real, Real]:
+        """Give what a fit says of weighted sums of numbers in their tolerances: values, and covariance."""
+        weight = np.array([[each.get(name, 0.0) for name in self._tolerated] for each in weights])
         values, covariance = self._within(fit)
-        return float(weight @ values), float(np.sqrt(max(weight @ covariance @ weight, 0.0)))
+        return weight @ values, weight @ covariance @ weight.T
 
     def _within(self, fit: Fit) -> tuple[Real, Real]:
         """``[tolerance]`` and ``[tolerance, tolerance]``: values and covariance, over the tolerances."""

@@ -41,8 +41,9 @@ def _pulled(one: Pulled) -> str:
     first, *others = one.links
     whose = f"{first} with {some_of(others)}" if others else first
     way = "more" if one.change > 0 else "less"
+    instead = f", or as well at {some_of(one.instead)}" if one.instead else ""
     return (
-        f"the log asks for {abs(one.change):.2g} ± {one.std:.1g} kg {way} at {whose}, "
+        f"the log asks for {abs(one.change):.2g} ± {one.std:.1g} kg {way} at {whose}{instead}, "
         f"{abs(one.over_tolerance):.2g} times the tolerance, which holds it back; weigh it, or raise inertia under "
         "[tolerance]"
     )
