@@ -25,7 +25,8 @@ from chladni.gap.records.diagnosis import (
     Verdict,
     Where,
 )
-from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.fit import Fit
 from chladni.gap.robots.forward import machine_of
 from chladni.gap.robots.next_measurement import next_measurement
 from chladni.gap.robots.pictures import joint_motion, torque_maps, torque_signals

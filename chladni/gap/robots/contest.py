@@ -1,20 +1,20 @@
 """Fits of sets of terms to the missing torque of all joints at once, and their evidence."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
-from math import comb, log
+from math import log
 
 import numpy as np
-from scipy.linalg.lapack import dtrtrs
-from scipy.optimize import nnls
+from scipy.sparse.csgraph import connected_components
 
 from chladni.gap.calibration import ANOTHER, DETAILS, QUARTER
-from chladni.gap.records.diagnosis import PARAMETER
+from chladni.gap.robots.fit import Fit, bounded, root_of
 from chladni.gap.robots.joints_left import JointsLeft
-from chladni.gap.robots.row import Row, columns_of_rows, parts_of
+from chladni.gap.robots.promise import Promises
+from chladni.gap.robots.row import Moments, Row, columns_of_rows, parts_of
+from chladni.gap.robots.set_prior import SetPrior
 from chladni.gap.robots.term import FOUND, Term
 from chladni.gap.robots.tolerances import tolerances
 from chladni.gap.robots.torques import RIGHT, Torques
@@ -26,55 +26,6 @@ _UNTOLD = 1e-3
 _ROUNDS, _NEAR = 8, 3
 #: Fits that are kept, those that were asked for last: twice as many as a search looks at around one set.
 _KEPT = 512
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Fit:
-    """A set of terms with its best numbers.
-
-    Attributes
-    ----------
-    terms
-        The set.
-    numbers, root
-        ``[number]`` of the tolerances first, which `Contest.tolerances` reads, then of the terms, over their scales;
-        and the lower triangular root of their information ``[number, number]``.
-    left
-        What is left at each joint.
-    nats
-        Evidence and prior.
-    within
-        How many of the numbers are of tolerances.
-    weight
-        ``[joint]``: times that energy which is left there costs as much as the noise's.
-    """
-
-    terms: tuple[Term, ...]
-    numbers: Real
-    root: Real
-    left: JointsLeft
-    nats: float
-    within: int
-    weight: Real
-
-    @property
-    def covariance(self) -> Real:
-        """``[number, number]``: of the numbers."""
-        inverse = _solved(self.root, np.eye(len(self.root)))
-        return np.asarray(inverse.T @ inverse)
-
-    @property
-    def strain(self) -> float:
-        """Nats by which values stand aside within their tolerances."""
-        return 0.5 * float(np.sum(self.numbers[: self.within] ** 2))
-
-    def values(self, place: int) -> tuple[Real, Real]:
-        """Numbers of a term and their standard deviations, SI, nominal included."""
-        first = self.within + sum(len(one.scale) for one in self.terms[:place])
-        term = self.terms[place]
-        rows = slice(first, first + len(term.scale))
-        deviation = np.sqrt(np.maximum(np.diag(self.covariance)[rows], 0.0))
-        return term.nominal + self.numbers[rows] * term.scale, deviation * term.scale
 
 
 class Contest:
@@ -119,8 +70,9 @@ class Contest:
         bounds = [term.least / term.scale for term in self.terms]
         self._least = np.concatenate([np.full(self.within, -np.inf), *bounds])
         self._mean = np.concatenate([np.zeros(self.within), *(term.about / term.scale for term in self.terms)])
-        kinds = {(term.key, term.rare): term for term in self.terms}
-        self._words, self._every = Counter((term.word, term.rare) for term in kinds.values()), log(max(len(kinds), 1))
+        self.prior = SetPrior.among(self.terms, torques.robot)
+        others = frozenset(joint.name for joint in torques.joints).difference(*self.prior.like)
+        self.groups = (*self.prior.like, others)
         # What tolerances alone leave.
         self._before = self._energy
         self._fits: dict[tuple[tuple[int, ...], bytes | None], Fit] = {}
@@ -135,7 +87,7 @@ class Contest:
     def _with(self, **parts: object) -> "Contest":
         """Give the same at the same prices, but for these parts."""
         other = copy(self)
-        for made in ("_alike", "_acting"):
+        for made in ("_promising", "_acting"):
             vars(other).pop(made, None)
         vars(other).update(parts, _fits={}, _promises={})
         return other
@@ -188,33 +140,24 @@ class Contest:
 
     def _fit(self, terms: Sequence[Term], weight: Real, rounds: int) -> Fit:
         chosen = self._chosen(terms)
-        gram, right = self._moments(chosen)
-        laws = self._laws(terms)
+        moments = Moments.of(self._rows, chosen)
+        laws = moments.at_rows(self._laws(terms))
         least, mean = self._least[chosen], self._mean[chosen]
-        arms = self._arms(terms)
+        arms, (belief, narrow) = self._arms(terms), self.prior.information(terms, self.within)
         for _ in range(rounds):
-            numbers = _bounded(_information(weight, gram), weight @ right + mean, least)
+            numbers = bounded(moments.information(weight) + belief, moments.toward(weight) + belief @ mean, least)
             for first, last, share in arms:
                 least[first] = max(share * float(np.linalg.norm(numbers[first + 1 : last])), 0.0)
                 numbers[first] = max(numbers[first], least[first])
-            left = self._left(gram, right, numbers, laws, self._passing(terms, numbers), self._units(terms, numbers))
+            left = self._left(moments, numbers, laws, self._passing(terms, numbers), self._units(terms, numbers))
             weight = left.weight
-        root = _root(_information(weight, gram))
-        size = -0.5 * float(np.sum((numbers - mean) ** 2)) - float(np.sum(np.log(np.diag(root))))
+        root = root_of(moments.information(weight) + belief)
+        size = -0.5 * float((numbers - mean) @ belief @ (numbers - mean)) - float(np.sum(np.log(np.diag(root))))
+        size += 0.5 * narrow
         return Fit(
             terms=tuple(terms), numbers=numbers, root=root, left=left, within=self.within,
-            nats=float(np.sum(left.log_likelihood)) + size + self.prior(terms), weight=weight,
+            nats=float(np.sum(left.log_likelihood)) + size + self.prior.nats(terms), weight=weight,
         )  # fmt: skip
-
-    def _moments(self, chosen: Index) -> tuple[Real, Real]:
-        """Give ``[row, chosen, chosen]`` and ``[row, chosen]``."""
-        gram = np.zeros((len(self._rows), chosen.size, chosen.size))
-        right = np.zeros(gram.shape[:2])
-        for row, one in enumerate(self._rows):
-            places, here = one.held(chosen)
-            gram[row, places[:, None], places] = one.gram[here[:, None], here]
-            right[row, places] = one.right[here]
-        return gram, right
 
     def tolerances(self, fit: Fit) -> dict[str, tuple[float, float]]:
         """Give what a fit says of numbers in their tolerances: value and standard deviation, over the tolerance."""
@@ -254,26 +197,6 @@ class Contest:
             kinds = (term.word, term.variant, FOUND), term.kind, (term.word, None, 0)
             found.append(next(forms[term.site, *kind] for kind in kinds if (term.site, *kind) in forms))
         return found
-
-    def prior(self, terms: Sequence[Term]) -> float:
-        """Nats of a set: each a cause of its own, or a word at several sites, as far as that is less."""
-        nats = 0.0
-        every = self._every
-        for word, count in Counter((term.word, term.rare) for term in terms).items():
-            alone = (log(ANOTHER) - every) * (count - 1)
-            # Terms of another contest may be at sites that are left out here.
-            sites = max(self._words[word], count)
-            shared = log(ANOTHER) - log(comb(sites, count)) if count > 1 else -np.inf
-            nats += log(ANOTHER) - every + max(alone, shared)
-        # What machines rarely have is one thing more than what most have.
-        nats += log(ANOTHER) * sum(term.rare for term in terms)
-        # A form that was chosen among several was one of them by chance.
-        forms = [term.form for term in terms if term.form is not None]
-        nats -= sum(log(one.count) + 0.5 * (one.value / one.usual) ** 2 for one in forms)
-        # Tolerances allow for what values are usually wrong by: more is one thing more.
-        nats += log(ANOTHER) * sum(term.word == PARAMETER for term in terms)
-        # A law that holds a simpler one, with another number, is one thing more.
-        return nats + log(ANOTHER) * sum(len(term.scale) - 1 for term in terms if term.rows)
 
     def _arms(self, terms: Sequence[Term]) -> list[tuple[int, int, float]]:
         """Places of a mass and behind its moments, and the least mass a unit of moment; over their scales."""
@@ -328,12 +251,12 @@ class Contest:
             place += len(term.numbers)
         return found
 
-    def _left(self, gram: Real, right: Real, numbers: Real, laws: Real, passing: Real, units: Real) -> JointsLeft:
-        energy = (self._energy - 2.0 * right @ numbers + (gram @ numbers) @ numbers) / passing
+    def _left(self, moments: Moments, numbers: Real, laws: Real, passing: Real, units: Real) -> JointsLeft:
+        at_rows = moments.at_rows(numbers)
+        energy = (self._energy - 2.0 * np.sum(moments.right * at_rows, axis=1) + moments.power(at_rows)) / passing
         energy += np.maximum(energy - self.count, 0.0) * (1.0 / units - 1.0)
-        own = laws * numbers
         # Neither a law that is undone by tolerances nor one that adds nothing has details.
-        force = np.minimum(np.sum(own * (gram @ own[..., None])[..., 0], axis=1), self._before - energy)
+        force = np.minimum(moments.power(laws * at_rows), self._before - energy)
         return JointsLeft(energy=np.maximum(energy, 0.0), count=self.count, force=np.maximum(force, 0.0))
 
     def quietest(self, fit: Fit) -> Real:
@@ -351,52 +274,22 @@ class Contest:
     def weighed_as(self, fit: Fit, weight: Real) -> Fit:
         """Give the numbers of the same set with its rows weighed so; what it leaves and its evidence stay."""
         chosen = self._chosen(fit.terms)
-        gram, right = self._moments(chosen)
-        information = _information(weight, gram)
-        numbers = _bounded(information, weight @ right + self._mean[chosen], self._least[chosen])
-        return replace(fit, numbers=numbers, root=_root(information), weight=weight)
+        moments, (belief, _) = Moments.of(self._rows, chosen), self.prior.information(fit.terms, self.within)
+        information = moments.information(weight) + belief
+        numbers = bounded(information, moments.toward(weight) + belief @ self._mean[chosen], self._least[chosen])
+        return replace(fit, numbers=numbers, root=root_of(information), weight=weight)
 
     def promise(self, fit: Fit) -> list[tuple[float, Term]]:
         """Give what each further term would bring at about, nats, with the rows weighed as in a fit; most first."""
         key = tuple(map(id, fit.terms)), fit.weight.tobytes(), fit.numbers.tobytes()
         if key not in self._promises:
-            self._promises[key] = self._promised(fit)
-        gains = self._promises[key]
-        terms = [term for _, alike, _ in self._alike for term in alike]
+            self._promises[key] = self._promising.of(self._chosen(fit.terms), fit.numbers, fit.weight, fit.root)
+        gains, terms = self._promises[key], self._promising.in_order
         return [(float(gains[place]), terms[place]) for place in np.argsort(-gains, kind="stable")]
 
-    def _promised(self, fit: Fit) -> Real:
-        """``[term]``: what each brings, in the order of `_alike`."""
-        weight, chosen = fit.weight, self._chosen(fit.terms)
-        gram, rest = np.zeros((self._size, chosen.size)), np.zeros(self._size)
-        for row in np.flatnonzero(weight):
-            one = self._rows[row]
-            places, here = one.held(chosen)
-            gram[one.numbers[:, None], places] += weight[row] * one.gram[:, here]
-            rest[one.numbers] += weight[row] * one.right
-        rest -= gram @ fit.numbers
-        shared = _solved(fit.root, gram.T).T
-        found = []
-        for at, _, blocks in self._alike:
-            own = np.tensordot(weight, blocks, 1) + np.eye(at.shape[1])
-            own -= shared[at] @ np.swapaxes(shared[at], 1, 2)
-            mean = self._mean[at]
-            wanted = rest[at] + mean
-            gains = np.einsum("tk,tk->t", wanted, np.linalg.solve(own, wanted[..., None])[..., 0])
-            found.append(0.5 * (gains - np.linalg.slogdet(own)[1] - np.sum(mean**2, axis=1)))
-        return np.concatenate(found)
-
     @cached_property
-    def _alike(self) -> list[tuple[Index, list[Term], Real]]:
-        """Terms with as many numbers, the places of these ``[term, number]``, and their moments."""
-        by_count: dict[int, list[Term]] = {}
-        for term in self.terms:
-            by_count.setdefault(len(term.numbers), []).append(term)
-        found = []
-        for terms in by_count.values():
-            at = np.array([self._places[id(one)] for one in terms])
-            found.append((at, terms, np.array([_blocks(one, at) for one in self._rows])))
-        return found
+    def _promising(self) -> Promises:
+        return Promises(rows=self._rows, terms=self.terms, places=self._places, mean=self._mean)
 
     def course(self, fit: Fit) -> tuple[Real, Real]:
         """Give ``[joint, coarse]`` twice: energy that a fit leaves, whitened, and what noise alone would leave.
@@ -424,7 +317,8 @@ class Contest:
         first = self.within + sum(len(one.scale) for one in fit.terms[:place])
         at = self._places[id(fit.terms[place])]
         numbers = fit.numbers[first : first + at.size]
-        added = np.einsum("p,jpq,q->j", numbers, self._moments(at)[0], numbers)
+        moments = Moments.of(self._rows, at)
+        added = moments.power(moments.at_rows(numbers))
         return np.asarray(added / np.maximum(self._energy, np.maximum(self.count, 1.0)))
 
     def over_rounding(self, energy: Real) -> Real:
@@ -455,57 +349,21 @@ class Contest:
         return np.asarray(fit.left.of_any_shape().log_likelihood - fit.left.log_likelihood + alone)
 
 
-def _blocks(row: Row, at: Index) -> Real:
-    """``[term, number, number]``: moments at a row of terms whose numbers are at these places ``[term, number]``."""
-    found = np.zeros((*at.shape, at.shape[1]))
-    flat, here = row.held(at.ravel())
-    places = np.full(at.shape, -1)
-    places.ravel()[flat] = here
-    acting = np.flatnonzero(np.any(places >= 0, axis=1))
-    own = places[acting]
-    both = (own[:, :, None] >= 0) & (own[:, None, :] >= 0)
-    found[acting] = np.where(both, row.gram[own[:, :, None], own[:, None, :]], 0.0)
-    return found
-
-
 def _told(whitened: Real) -> Real:
-    """``[told, tolerance]``: combinations of tolerances that a log tells of, orthogonal, of one deviation each."""
-    flat = whitened.reshape(len(whitened), -1)
-    information, combinations = np.linalg.eigh(flat @ flat.T)
-    return np.asarray(combinations[:, information > _UNTOLD].T)
+    """``[told, tolerance]``: combinations of tolerances that a log tells of, orthogonal, of one deviation each.
 
-
-def _information(weight: Real, gram: Real) -> Real:
-    """``[number, number]``: of numbers whose moments ``[row, number, number]`` are weighed."""
-    return np.tensordot(weight, gram, 1) + np.eye(gram.shape[1])
-
-
-def _root(information: Real) -> Real:
-    """Lower triangular."""
-    return np.asarray(np.linalg.cholesky(information), dtype=np.float64)
-
-
-def _bounded(information: Real, right: Real, least: Real) -> Real:
-    """Solve for numbers of which some have a lower bound, by nonnegative least squares (Lawson & Hanson 1974)."""
-    bound = np.isfinite(least)
-    # Behind the free ones, whose part is eliminated so.
-    order, free = np.argsort(bound, kind="stable"), int(np.sum(~bound))
-    root = _root(information[np.ix_(order, order)])
-    toward = _solved(root, right[order])
-    found = _solved(root, toward, turned=True)
-    low = least[order[free:]]
-    if np.any(found[free:] < low):
-        own = root[free:, free:].T
-        found[free:] = low + nnls(own, toward[free:] - own @ low)[0]
-        found[:free] = _solved(root[:free, :free], toward[:free] - found[free:] @ root[free:, :free], turned=True)
-    numbers = np.empty_like(found)
-    numbers[order] = found
-    return numbers
-
-
-def _solved(root: Real, right: Real, *, turned: bool = False) -> Real:
-    """Solve with a lower triangular matrix, or with its transpose.
-
-    By LAPACK itself: what checks its arguments takes longer than matrices of such sizes.
+    Of the branches of a robot each has its own, so that few act at a row.
     """
-    return np.asarray(dtrtrs(root.T, right, trans=0 if turned else 1)[0])
+    acts = np.any(whitened, axis=2)
+    everywhere = np.all(acts | ~np.any(acts, axis=0), axis=1)
+    beside = acts[~everywhere].astype(np.intp)
+    _, branch = connected_components(beside @ beside.T, directed=False)
+    groups = [np.flatnonzero(everywhere), *(np.flatnonzero(~everywhere)[branch == one] for one in np.unique(branch))]
+    found = [np.zeros((0, len(whitened)))]
+    for group in groups:
+        flat = whitened[group].reshape(group.size, whitened.shape[1] * whitened.shape[2])
+        information, combinations = np.linalg.eigh(flat @ flat.T)
+        told = np.zeros((group.size, len(whitened)))
+        told[:, group] = combinations.T
+        found.append(told[information > _UNTOLD])
+    return np.concatenate(found)

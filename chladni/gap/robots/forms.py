@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.fit import Fit
 from chladni.gap.robots.search import alternatives, merged
 from chladni.gap.robots.term import Form, Term
 from chladni.gap.robots.torques import FormKey

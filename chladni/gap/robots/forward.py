@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.fit import Fit
 from chladni.gap.robots.joint_words import ALONG_THE_WAY, way_of
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.tolerances import INERTIAL_NAMES, LOOP_S, tolerated_inertia

@@ -11,7 +11,8 @@ from chladni.gap.calibration import CLOSE, LEAST_SHARE
 from chladni.gap.design.design import Design
 from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.gap.records.robot import site_words
-from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.fit import Fit
 from chladni.gap.robots.joint_noise import steps_and_noise
 from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.term import Term

@@ -7,7 +7,8 @@ import numpy as np
 from chladni.gap.comparison.shares import gap_map
 from chladni.gap.records.diagnosis import GapSignals
 from chladni.gap.records.robot import JointMotion, Over, TorqueMap
-from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.fit import Fit
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import Torques
 from chladni.gap.robots.trial import Confirmed

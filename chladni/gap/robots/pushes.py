@@ -9,7 +9,8 @@ from scipy.special import chdtri, expit
 
 from chladni.gap.calibration import ANOTHER, CLOSE, DETAILS, DOUBTED, FAR, LAPSE, LITTLE, MOST, QUARTER, TEMPER
 from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber
-from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.fit import Fit
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import RIGHT, Torques
 from chladni.robots.robot import RobotJoint

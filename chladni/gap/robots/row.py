@@ -52,6 +52,62 @@ class Row:
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Moments:
+    """Moments of chosen numbers at all rows, of which few act at each.
+
+    Attributes
+    ----------
+    places
+        ``[row, acting]``: places among the chosen ones; behind the last where a row has fewer than another.
+    gram, right
+        ``[row, acting, acting]``, ``[row, acting]``.
+    size
+        How many are chosen.
+    """
+
+    places: Index
+    gram: Real
+    right: Real
+    size: int
+
+    @classmethod
+    def of(cls, rows: Sequence[Row], chosen: Index) -> "Moments":
+        """Gather the moments of numbers."""
+        held = [one.held(chosen) for one in rows]
+        most = max((own.size for own, _ in held), default=0)
+        places = np.full((len(rows), most), chosen.size)
+        gram, right = np.zeros((len(rows), most, most)), np.zeros((len(rows), most))
+        for row, (one, (own, here)) in enumerate(zip(rows, held, strict=True)):
+            count = own.size
+            places[row, :count], right[row, :count] = own, one.right[here]
+            gram[row, :count, :count] = one.gram[here[:, None], here]
+        return cls(places=places, gram=gram, right=right, size=chosen.size)
+
+    def at_rows(self, numbers: Real) -> Real:
+        """``[row, acting]`` of ``[..., number]``, a row or all rows."""
+        padded = np.concatenate([numbers, np.zeros((*numbers.shape[:-1], 1))], axis=-1)
+        return padded[self.places] if padded.ndim == 1 else np.take_along_axis(padded, self.places, axis=1)
+
+    def information(self, weight: Real) -> Real:
+        """``[number, number]`` with the rows weighed."""
+        side = self.size + 1
+        flat = self.places[:, :, None] * side + self.places[:, None, :]
+        weighed = (weight[:, None, None] * self.gram).ravel()
+        found = np.bincount(flat.ravel(), weighed, minlength=side * side).reshape(side, side)
+        return np.asarray(found[:-1, :-1], dtype=np.float64)
+
+    def toward(self, weight: Real) -> Real:
+        """``[number]``: the right side with the rows weighed."""
+        weighed = (weight[:, None] * self.right).ravel()
+        found = np.bincount(self.places.ravel(), weighed, minlength=self.size + 1)
+        return np.asarray(found[:-1], dtype=np.float64)
+
+    def power(self, numbers: Real) -> Real:
+        """``[row]``: energy of what numbers ``[row, acting]`` explain."""
+        return np.asarray(np.sum(numbers * (self.gram @ numbers[..., None])[..., 0], axis=1))
+
+
 #: Of each row at which a block of numbers acts: the row, places of those that do, and columns ``[acting, coarse]``.
 Parts = tuple[tuple[int, Index, Real], ...]
 

@@ -5,7 +5,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import islice, takewhile
 
-from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.fit import Fit
 from chladni.gap.robots.term import FOUND, Term
 
 #: Nats that a term would bring at about, and the term.
@@ -32,6 +33,8 @@ def searched(
         better = _tidied(contest, more, _changed(contest, best, more))
         if better.nats < best.nats + _WORTH:
             better = _tidied(contest, better)
+        if better.nats < best.nats + _WORTH and begin is None:
+            better = made_alike(contest, better)
         if better.nats < best.nats + _WORTH:
             break
         best = better
@@ -40,11 +43,12 @@ def searched(
 
 
 def _more(contest: Contest, best: Fit) -> list[Fit]:
-    """Fit the set with one more of the terms that promise most; or with a word at every joint."""
+    """Fit the set with one more of the terms that promise most; or with a word at a whole group of joints."""
     taken = {term.key for term in best.terms}
     promised = _free(taken, contest.promise(best))
     found = [contest.fit([*best.terms, term], best) for _, term in islice(_each(promised), _FITTED)]
-    found += [contest.fit([*best.terms, *shared], best) for shared in _shared([term for _, term in promised])]
+    families = [one for group in contest.groups for one in _families(group, promised)]
+    found += [contest.fit([*best.terms, *one], best) for _, one in sorted(families, key=_promises)[:_FITTED]]
     if _best(found).nats > best.nats + _WORTH:
         return found
     # Where a description has too much of one thing and too little of another, either alone makes it worse.
@@ -74,11 +78,48 @@ def _each(promised: Iterable[Promise]) -> Iterator[Promise]:
             yield nats, term
 
 
-def _shared(others: Sequence[Term]) -> Iterable[list[Term]]:
-    """Words at all joints that lack them."""
-    alone = [term for term in others if term.rows and not term.is_coupling]
-    for kind in dict.fromkeys(term.kind for term in alone):
-        yield [term for term in alone if term.kind == kind]
+def _families(sites: Collection[str], promised: Iterable[Promise]) -> list[tuple[float, list[Term]]]:
+    """Give the words at several of some joints, all that lack them, and what they promise together."""
+    found: dict[tuple[str, str | None, int], list[Promise]] = {}
+    for nats, term in _at(sites, promised):
+        found.setdefault(term.kind, []).append((nats, term))
+    return [(sum(nats for nats, _ in one), [term for _, term in one]) for one in found.values() if len(one) > 1]
+
+
+def _promises(family: tuple[float, list[Term]]) -> float:
+    """Most first."""
+    return -family[0]
+
+
+def made_alike(contest: Contest, best: Fit) -> Fit:
+    """Fit at all of a group of like joints, in place of what stands there, the words of one of them.
+
+    Two words that stand for one are exchanged for it one by one only over what is worse. What such an exchange leaves
+    to others shows when these are tidied.
+    """
+    found = [one for group in contest.prior.like for one in _copied(contest, best, group)]
+    likely = max(found, key=lambda one: one.nats, default=best)
+    return (
+        best
+        if likely.nats < best.nats - _BEHIND
+        else _best([best, _tidied(contest, likely, _changed(contest, best, likely))])
+    )
+
+
+def _copied(contest: Contest, best: Fit, group: Collection[str]) -> Iterator[Fit]:
+    rest = contest.fit([term for term in best.terms if term.site not in group], best)
+    promised = contest.promise(rest)
+    # Of each law the form that promises most.
+    here = {site: {_law(one): one for _, one in reversed(_at({site}, promised))} for site in sorted(group)}
+    stand = {site: frozenset(_law(one) for one in best.terms if one.site == site) for site in here}
+    for laws in dict.fromkeys(stand.values()):
+        if any(own != laws for own in stand.values()) and all(laws <= one.keys() for one in here.values()):
+            terms = [one[each] for one in here.values() for each in sorted(laws, key=str)]
+            yield contest.fit([*rest.terms, *terms], best)
+
+
+def _law(term: Term) -> tuple[str, str | None]:
+    return term.word, term.variant
 
 
 def _changed(contest: Contest, one: Fit, other: Fit) -> frozenset[int]:
@@ -100,12 +141,27 @@ def _tidied(contest: Contest, best: Fit, rows: frozenset[int] | None = None) -> 
     while True:
         tried = [place for place, term in enumerate(best.terms) if rows is None or rows & contest.rows(term)]
         found = [one for place in tried for one in alternatives(contest, best, place, _EXCHANGED, _BEHIND)]
-        better = _best([best, *found, *merged(contest, best, tried), *_exchanged(contest, best, tried)])
+        better = _combined(contest, best, [*found, *merged(contest, best, tried), *_exchanged(contest, best, tried)])
         if better is best:
             return best
-        if rows is not None:
-            rows |= _changed(contest, best, better)
-        best = better
+        # Far from what is new little changes.
+        rows, best = _changed(contest, best, better), better
+
+
+def _combined(contest: Contest, best: Fit, found: Sequence[Fit]) -> Fit:
+    """Make the best of some moves, and those beside it that act elsewhere, as far as each makes it better still."""
+    helping = sorted((one for one in found if one.nats > best.nats), key=lambda one: -one.nats)
+    if not helping:
+        return best
+    better, taken = helping[0], set(_changed(contest, best, helping[0]))
+    for one in helping[1:]:
+        rows = _changed(contest, best, one)
+        if taken.isdisjoint(rows):
+            kept = [term for term in better.terms if term in one.terms or term not in best.terms]
+            both = contest.fit([*kept, *(term for term in one.terms if term not in best.terms)], better)
+            if both.nats > better.nats:
+                better, taken = both, taken | rows
+    return better
 
 
 def _in_place(
@@ -141,24 +197,22 @@ def merged(contest: Contest, best: Fit, tried: Iterable[int]) -> list[Fit]:
 
 
 def _exchanged(contest: Contest, best: Fit, tried: Sequence[int]) -> list[Fit]:
-    """Fit another word at all sites of one that several have, as they're made alike; or one term in place of all."""
+    """Fit another word at all joints of a group that have one, as they're made alike; or one term in place of all."""
     found = []
-    kinds = {(best.terms[place].word, best.terms[place].rare) for place in tried}
-    for kind, count in Counter((term.word, term.rare) for term in best.terms).items():
-        if count == 1 or kind not in kinds:
-            continue
-        sites = {term.site for term in best.terms if (term.word, term.rare) == kind}
-        rest = contest.fit([term for term in best.terms if (term.word, term.rare) != kind], best)
-        taken = {term.key for term in rest.terms}
-        others = _in_place(contest, rest, best, _EXCHANGED, partial(_free, taken))
-        alike: dict[tuple[str, str | None, int], list[Promise]] = {}
-        for nats, term in _at(sites, _free(taken, contest.promise(rest))):
-            if term.word != kind[0]:
-                alike.setdefault(term.kind, []).append((nats, term))
-        families = [one for one in alike.values() if len(one) == len(sites)]
-        families.sort(key=lambda one: -sum(nats for nats, _ in one))
-        found += [rest, *(contest.fit([*rest.terms, term], best) for term in others)]
-        found += [contest.fit([*rest.terms, *(term for _, term in one)], best) for one in families[:_EXCHANGED]]
+    for group in contest.groups:
+        alike = Counter((term.word, term.rare) for term in best.terms if term.site in group)
+        kinds = {(term.word, term.rare) for term in (best.terms[place] for place in tried) if term.site in group}
+        for kind in (one for one, count in alike.items() if count > 1 and one in kinds):
+            own = [term for term in best.terms if term.site in group and (term.word, term.rare) == kind]
+            rest = contest.fit([term for term in best.terms if term not in own], best)
+            taken = {term.key for term in rest.terms}
+            others = _in_place(contest, rest, best, _EXCHANGED, partial(_free, taken))
+            free = [one for one in _free(taken, contest.promise(rest)) if one[1].word != kind[0]]
+            families = [one for one in _families({term.site for term in own}, free) if len(one[1]) == len(own)]
+            found += [rest, *(contest.fit([*rest.terms, term], best) for term in others)]
+            found += [
+                contest.fit([*rest.terms, *one], best) for _, one in sorted(families, key=_promises)[:_EXCHANGED]
+            ]
     return found
 
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from chladni.gap.calibration import SAME
-from chladni.gap.robots.contest import Contest, Fit
+from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.fit import Fit
 from chladni.gap.robots.forms import Forms, refined
 from chladni.gap.robots.gains import Gains, guessed_gains, unknown_gains, with_gains
 from chladni.gap.robots.payload_words import OF_THE_LOG
@@ -175,14 +176,19 @@ def _settled(
     """Search until guesses and the noise's level have settled; from the words of a fit, and at the level given."""
     best = searched(contest, *([] if first is None else [contest.again(first)]), progress=progress)
     spread: Forms = {}
+    is_still = False
     for _ in range(_SHIFTS):
         forms, spread = refined(contest, best, contest.torques.guesses.forms)
         leveled = contest.torques.with_level(contest.quietest(best)) if levels else contest.torques
         guessed = leveled.with_guesses(_guesses(contest, best, forms), contest.explained(best))
         if _is_settled(contest.torques, guessed):
             break
+        # What one search left as it was isn't searched again at the same noise.
+        is_still = is_still and _is_as_quiet(contest.torques, guessed)
         contest = Contest(guessed, left_out)
-        best = searched(contest, contest.again(best), progress=progress)
+        begin = contest.again(best)
+        best = begin if is_still else searched(contest, begin, progress=progress)
+        is_still = set(best.terms) == set(begin.terms)
     return Solved(contest=contest, best=best, spread=spread)
 
 
@@ -214,8 +220,6 @@ def _turn_s(contest: Contest, fit: Fit) -> float:
 
 
 def _is_settled(before: Torques, after: Torques) -> bool:
-    if before.level is None or after.level is None:
-        return False
     old, new = before.guesses, after.guesses
     pairs: tuple[tuple[Mapping[Any, Any], Mapping[Any, Any], float], ...] = (
         (old.late_s, new.late_s, _SETTLED_S),
@@ -223,10 +227,16 @@ def _is_settled(before: Torques, after: Torques) -> bool:
         (old.offset, new.offset, _SETTLED_M),
         (_logs(old.forms), _logs(new.forms), _SETTLED),
     )
-    return bool(np.all(np.abs(np.log(after.level / before.level)) < np.log(SAME))) and all(
+    return _is_as_quiet(before, after) and all(
         was.keys() == now.keys() and all(np.max(np.abs(now[key] - was[key])) < close for key in now)
         for was, now, close in pairs
     )
+
+
+def _is_as_quiet(before: Torques, after: Torques) -> bool:
+    if before.level is None or after.level is None:
+        return False
+    return bool(np.all(np.abs(np.log(after.level / before.level)) < np.log(SAME)))
 
 
 def _logs(forms: Forms) -> dict[FormKey, float]:

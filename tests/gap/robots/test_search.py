@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chladni.gap.robots.contest import Contest, Fit
-from chladni.gap.robots.row import Row, columns_of_rows, parts_of
+from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.fit import Fit
+from chladni.gap.robots.row import Moments, Row, columns_of_rows, parts_of
 from chladni.gap.robots.search import alternatives, searched
 from chladni.gap.robots.solved import Solved, solved
 from chladni.gap.robots.torques import ALL_COMMANDS, torques_of
@@ -68,6 +69,26 @@ def test_weights_of_its_own_change_no_number(elastic: tuple[Contest, Fit]) -> No
     assert again.nats == best.nats
 
 
+def test_a_promise_is_what_a_term_brings_where_rows_are_weighed_so(elastic: tuple[Contest, Fit]) -> None:
+    contest, best = elastic
+    rest = contest.weighed_as(contest.fit(best.terms[:1], best), best.weight)
+
+    def worth(fit: Fit) -> float:
+        """Nats of numbers without bounds: half their squares and the logarithm of their information's root."""
+        return 0.5 * float(np.sum((fit.root.T @ fit.numbers) ** 2)) - float(np.sum(np.log(np.diag(fit.root))))
+
+    tried = 0
+    for nats, term in contest.promise(rest):
+        both = contest.weighed_as(contest.fit([*rest.terms, term], best), best.weight)
+        # Bounds aren't in a promise.
+        if np.all(both.numbers[rest.numbers.size :] > term.least / term.scale):
+            brought = worth(both) - worth(rest) - 0.5 * np.sum((term.about / term.scale) ** 2)
+            assert brought == pytest.approx(nats, abs=1e-3)
+            tried += 1
+    # Some act at one row, some at both.
+    assert tried > 20
+
+
 def without_noise(robot: Robot, machine: Machine, late: int = 0) -> Solved:
     """What a log of a machine whose commands come so many samples late is explained by."""
     command = commands(SECONDS)
@@ -118,6 +139,17 @@ def test_moments_of_a_row_are_those_of_all_its_columns(seed: int, acting: list[b
         gram[np.ix_(places, places)], right[places] = row.gram[np.ix_(here, here)], row.right[here]
         np.testing.assert_allclose(gram, (whole[chosen] * whiten**2) @ whole[chosen].T, atol=1e-12)
         np.testing.assert_allclose(right, (whole[chosen] * whiten**2) @ missing, atol=1e-12)
+        weight = random.uniform(0.5, 2.0, 3)
+        moments = Moments.of(rows, chosen)
+        wholes = [block[:, each] * scale[:, None] for each in (0, 1)]
+        dense = [(one[chosen] * whiten**2) @ one[chosen].T for one in wholes]
+        information = weight[0] * dense[0] + weight[1] * dense[1]
+        np.testing.assert_allclose(moments.information(weight), information, atol=1e-12)
+        toward = sum(each * (one[chosen] * whiten**2) @ missing for each, one in zip(weight[:2], wholes, strict=True))
+        np.testing.assert_allclose(moments.toward(weight), toward, atol=1e-12)
+        numbers = random.standard_normal(chosen.size)
+        power = [numbers @ one @ numbers for one in dense] + [0.0]
+        np.testing.assert_allclose(moments.power(moments.at_rows(numbers)), power, atol=1e-12)
         few = row.among(chosen)
         np.testing.assert_array_equal(few.gram, row.gram[np.ix_(here, here)])
         assert all(np.array_equal(few.column(n), whole[chosen[n]]) for n in few.numbers)
