@@ -2,11 +2,11 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, Self
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, Protocol, Self
 
 from rich import box
 from rich.console import Console
@@ -124,8 +124,10 @@ class Output:
         for text in texts:
             self.console.print(Text(f"- {visible(text)}"), style="yellow" if text.startswith("Warning") else "")
 
-    def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Print a table; the first column is text, the others line up to the right."""
+    def table(
+        self, title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], *, texts: Container[int] = (0,)
+    ) -> None:
+        """Print a table; columns with the numbers `texts` are text, the others line up to the right."""
         # Without vertical lines: long channel names need the room in a terminal of 100 columns.
         table = Table(
             box=box.SIMPLE_HEAD,
@@ -135,7 +137,8 @@ class Output:
         )
         for number, column in enumerate(columns):
             # A heading may be broken into lines; it's a word of ours.
-            table.add_column(escape(visible_lines(column)), justify="right" if number else "left", overflow="fold")
+            side: Literal["left", "right"] = "left" if number in texts else "right"
+            table.add_column(escape(visible_lines(column)), justify=side, overflow="fold")
         for row in rows[:MOST_ROWS]:
             table.add_row(*(escape(visible(cell)) for cell in row))
         # Not as the table's own title, which would wrap at the table's width.

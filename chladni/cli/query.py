@@ -1,7 +1,7 @@
 """``chladni query``: SQL over the tables of a study."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -10,6 +10,9 @@ from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.words import NOTHING, number
 from chladni.signals.wording import counted
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 
 def query(
@@ -34,12 +37,20 @@ def query(
     if not columns:
         out.line("done; the question gives no rows")
     else:
-        out.table(counted(answer.num_rows, "row"), columns, [[_cell(row[one]) for one in columns] for row in rows])
+        cells = [[_cell(row[one]) for one in columns] for row in rows]
+        texts = [place for place, field in enumerate(answer.schema) if not _is_number(field.type)]
+        out.table(counted(answer.num_rows, "row"), columns, cells, texts=texts)
     out.json(lambda: {"format": "chladni.query/1", "columns": columns, "rows": [_plain(row) for row in rows]})
     if csv is not None:
         from chladni.io.study.results import write_answer
 
         out.line(f"table: {write_answer(csv, answer)}")
+
+
+def _is_number(kind: "pa.DataType") -> bool:
+    import pyarrow.types as kinds
+
+    return bool(kinds.is_integer(kind) or kinds.is_floating(kind) or kinds.is_decimal(kind))
 
 
 def _cell(value: Any) -> str:
