@@ -9,6 +9,7 @@ from chladni.cli import options
 from chladni.cli.mode_rows import print_modes, print_relative_motion
 from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
+from chladni.signals.errors import SetupError
 
 if TYPE_CHECKING:
     from chladni.apps.modal_study import ModalStudy
@@ -32,6 +33,10 @@ def modes(
         tuple[float, float] | None,
         typer.Option(metavar="LO-HI", help="Only modes between these frequencies, in Hz.", show_default=False),
     ] = None,
+    fmax: Annotated[
+        float | None,
+        typer.Option("--fmax", metavar="HZ", help="Only modes below this frequency.", show_default=False),
+    ] = None,
     count: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="At most so many modes.", show_default=False)
     ] = None,
@@ -52,6 +57,7 @@ def modes(
     part: options.Part,
     join: options.Join = "auto",
     opener: Opener,
+    looks: options.Looks,
     targets: options.Targets,
     uff: Annotated[
         Path | None,
@@ -65,8 +71,9 @@ def modes(
     from chladni.apps.modal_study import modal_study
     from chladni.apps.modes import Wanted
 
-    out = targets.output([log, opener.setup], others={"--uff": uff, "--save": save})
-    wanted = Wanted.of(bands_hz=None if band is None else [band], count=count, frequencies_hz=frequency)
+    out = targets.output([log, opener.setup], looks, others={"--uff": uff, "--save": save})
+    asked = _below(band, fmax)
+    wanted = Wanted.of(bands_hz=None if asked is None else [asked], count=count, frequencies_hz=frequency)
     given: dict[str, Any] = {
         "references": reference, "operational": operational, "channels": channel, "method": method,
         "resolution_hz": resolution, "span": part.span(join=join),
@@ -80,7 +87,16 @@ def modes(
     print_modes(out, found.modes, found.validation)
     print_relative_motion(out, found.modes, found.study.relative_motion)
     out.lines(found.study.findings)
-    _write(out, found, targets, uff=uff, save=save)
+    _write(out, found, targets, looks, uff=uff, save=save)
+
+
+def _below(band: tuple[float, float] | None, fmax: float | None) -> tuple[float, float] | None:
+    if fmax is None:
+        return band
+    low_hz, high_hz = band or (0.0, fmax)
+    if not fmax > low_hz:
+        raise SetupError(f"--fmax {fmax:g} leaves no frequency; give one above {low_hz:g} Hz")
+    return low_hz, min(high_hz, fmax)
 
 
 def _picking(out: Output, log: "OpenedLog", **given: Any) -> "ModePicking":
@@ -113,7 +129,13 @@ def _kept(out: Output, picking: "ModePicking", wanted: "Wanted", *, port: int, o
 
 
 def _write(
-    out: Output, found: "ModalStudy", targets: options.Targets, *, uff: Path | None, save: Path | None
+    out: Output,
+    found: "ModalStudy",
+    targets: options.Targets,
+    looks: options.Looks,
+    *,
+    uff: Path | None,
+    save: Path | None,
 ) -> None:
     from chladni.apps.modes_document import modes_document
 
@@ -127,6 +149,6 @@ def _write(
         from chladni.viewers.rerun import write_rrd
 
         out.line(f"recording: {write_rrd(found.study, save)}")
-    out.pictures(found.study, figures=targets.figures, report=targets.report)
+    out.pictures(found.study, figures=targets.figures, report=targets.report, looks=looks)
     motions, passed_on = found.study.relative_motion, found.transmissibility
     out.json(modes_document, found.modes, found.validation, motions, passed_on)

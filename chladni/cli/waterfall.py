@@ -21,6 +21,7 @@ def waterfall(
     cut: options.Cut,
     part: options.Part,
     opener: Opener,
+    log_frequency: options.LogFrequency = False,
     targets: options.Targets,
 ) -> None:
     """Spectra over time: how strong each frequency is in each slice of the log."""
@@ -28,7 +29,8 @@ def waterfall(
     from chladni.apps.waterfalls import measure_waterfalls, waterfalls_document
     from chladni.signals.study import Study
 
-    out = targets.output([log, opener.setup])
+    looks = options.Looks(log_frequency=log_frequency)
+    out = targets.output([log, opener.setup], looks)
     with opener(log) as opened, out.progress(log.name) as progress:
         whole = measure_waterfalls(
             opened, channels=channel, averaging=averages.averaging(), span=part.span(), progress=progress
@@ -40,9 +42,8 @@ def waterfall(
     findings = (*told, *dict.fromkeys(note for one in found for note in one.provenance.notes))
     out.lines(findings)
     out.csv(found)
-    out.pictures(
-        Study(title=log.name, waterfalls=found, findings=findings), figures=targets.figures, report=targets.report
-    )
+    study = Study(title=log.name, waterfalls=found, findings=findings)
+    out.pictures(study, figures=targets.figures, report=targets.report, looks=looks)
     out.json(waterfalls_document, found)
 
 

@@ -1,5 +1,6 @@
 """Where the frequency axis ends, and how spectra are divided in pictures: --fmax, --log-frequency, --db."""
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -110,9 +111,20 @@ def test_pictures_are_divided_as_asked_for(
     assert asked == [scales]
 
 
-@pytest.mark.parametrize("command", ["psd", "frf"])
-@pytest.mark.parametrize("option", ["--db", "--log-frequency"])
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [*product(["psd", "frf", "modes"], ["--db", "--log-frequency"]), ("waterfall", "--log-frequency")],
+)
 def test_how_pictures_look_is_refused_without_any(run: Run, log: Path, command: str, option: str) -> None:
     refused = run(command, log, option)
     assert (refused.code, refused.out, refused.err.count("\n")) == (2, "", 1)
     assert f"{option} says how pictures look; ask for some (--figures FOLDER or --report FILE.html)" in refused.err
+
+
+def test_fmax_is_the_upper_end_of_the_band(run: Run, log: Path) -> None:
+    told = run("modes", log, "--fmax", 100, "--json", "-").document
+    assert told == run("modes", log, "--band", "0-100", "--json", "-").document
+    assert told["modes"]
+    refused = run("modes", log, "--band", "20-100", "--fmax", 10)
+    assert (refused.code, refused.err.count("\n")) == (2, 1)
+    assert "--fmax 10 leaves no frequency; give one above 20 Hz" in refused.err

@@ -27,6 +27,7 @@ from chladni.viewers.figures import (
     stabilisation_figures,
     synthesis_figures,
 )
+from chladni.viewers.figures.log_axis import Scales
 from chladni.viewers.style import AMPLITUDES
 from tests.viewers import synthetic_modes as made
 
@@ -317,6 +318,24 @@ def test_synthesis_lies_over_the_measured_function_with_its_error(figures: dict[
     np.testing.assert_array_equal(lines["synthesised"].get_ydata(), np.abs(MODES.fit.synthesised[4, 0]))
     np.testing.assert_array_equal(lines["measured"].get_ydata(), np.abs(ARM.response.values[4, 0]))
     assert "Accelerance |H| [(m/s²)/N]\nto shaker.x" in texts(figures["synthesis 1 Acceleration 2/2"])
+
+
+def test_poles_and_synthesis_are_divided_as_asked_for(figures: dict[str, Figure]) -> None:
+    scales, usual = Scales(decibels=True, log_frequency=True), figures
+    asked = {**stabilisation_figures(ARM, scales=scales), **synthesis_figures(ARM, scales=scales)}
+    synthesis, *_ = (name for name in asked if name.startswith("synthesis"))
+    for name in ("stabilisation", synthesis):
+        axes, plain = asked[name].axes[0], usual[name].axes[0]
+        assert (axes.get_xscale(), plain.get_xscale()) == ("log", "linear")
+        assert axes.get_xlim()[0] > 0
+    assert "[dB over 1 " in str(asked[synthesis].get_supylabel())
+    # A name stands over its line, whichever way frequency is divided.
+    poles = asked["stabilisation"].axes[0]
+    ends = np.log(poles.get_xlim())
+    for text in poles.texts:
+        hertz = float(text.get_text().split()[0])
+        place = (np.log(hertz) - ends[0]) / (ends[1] - ends[0])
+        assert abs(text.xy[0] - place) < 0.03
 
 
 def test_complexity_is_the_components_in_the_plane(figures: dict[str, Figure]) -> None:

@@ -44,7 +44,7 @@ class Album:
     def of(cls, study: Study, *, scales: Scales = USUAL) -> Self:
         """Draw every figure that the study has data for: waveforms, spectra, transfer functions, modes.
 
-        `scales` divides the axes of spectra and transfer functions.
+        `scales` divides the axes of spectra, transfer functions and stabilisation diagrams.
         """
         return cls(
             {
@@ -60,8 +60,8 @@ class Album:
                 "waterfalls": waterfall_figures(study, scales=scales),
                 "mode shapes": mode_shape_figures(study),
                 "relative motion": relative_motion_figures(study),
-                "stabilisation": stabilisation_figures(study),
-                "synthesis": synthesis_figures(study),
+                "stabilisation": stabilisation_figures(study, scales=scales),
+                "synthesis": synthesis_figures(study, scales=scales),
                 "mac": mac_figures(study),
                 "complexity": complexity_figures(study),
             }

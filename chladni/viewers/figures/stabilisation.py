@@ -11,7 +11,7 @@ from chladni.signals.mode_set import ModeSet
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.signals.study import Study
 from chladni.viewers.drawing import decibels_of_amplitude, level_limits
-from chladni.viewers.figures.log_axis import logarithmic
+from chladni.viewers.figures.log_axis import USUAL, Scales, logarithmic, logarithmic_frequency
 from chladni.viewers.figures.sheet import legend, look, paint, sheet
 from chladni.viewers.figures.upright import STRIP_POINTS, name_above
 from chladni.viewers.labels import printed_unit
@@ -29,29 +29,41 @@ MARK_SHARE, MARK_POINTS = 0.55, (0.9, 2.2)
 RINGS = 250
 
 
-def stabilisation_figures(study: Study) -> dict[str, Figure]:
+def stabilisation_figures(study: Study, *, scales: Scales = USUAL) -> dict[str, Figure]:
     """Draw the poles of all model orders over the indicator, by name; none for methods without model orders."""
     if study.modes is None or study.modes.stabilisation is None:
         return {}
     with look():
-        return {"stabilisation": _figure(study.modes, study.modes.stabilisation)}
+        return {"stabilisation": _figure(study.modes, study.modes.stabilisation, scales)}
 
 
-def _figure(modes: ModeSet, diagram: StabilisationDiagram) -> Figure:
+def _figure(modes: ModeSet, diagram: StabilisationDiagram, scales: Scales) -> Figure:
     named = modes.frequency_hz.size + len(modes.harmonics) > 0
     figure, (poles,) = sheet([HEIGHT_IN], above_points=STRIP_POINTS if named else 0.0)
-    draw_stabilisation(poles, diagram, modes.frequency_hz, [line.frequency_hz for line in modes.harmonics])
+    machines_hz = [line.frequency_hz for line in modes.harmonics]
+    draw_stabilisation(poles, diagram, modes.frequency_hz, machines_hz, scales=scales)
     poles.set_xlabel("Frequency [Hz]")
     return figure
 
 
 def draw_stabilisation(
-    poles: Axes, diagram: StabilisationDiagram, modes_hz: Real, machines_hz: Sequence[float] = ()
+    poles: Axes,
+    diagram: StabilisationDiagram,
+    modes_hz: Real,
+    machines_hz: Sequence[float] = (),
+    *,
+    scales: Scales = USUAL,
 ) -> None:
     """Draw poles over the indicator, and the frequencies of modes and of machines."""
     shown_hz = frequency_range(modes_hz, diagram)
     _draw_indicator(poles, shown_hz, diagram)
-    poles.set_xlim(*shown_hz)
+    lines_hz = diagram.indicator_hz[(diagram.indicator_hz >= shown_hz[0]) & (diagram.indicator_hz > 0)]
+    if scales.log_frequency and lines_hz.size:
+        # From the first line above 0 Hz on.
+        shown_hz = (float(lines_hz[0]), shown_hz[1])
+        logarithmic_frequency(poles, *shown_hz)
+    else:
+        poles.set_xlim(*shown_hz)
     poles.set_ylim(*order_range(diagram))
     _draw_poles(poles, diagram)
     poles.set_ylabel("Model order")

@@ -28,7 +28,10 @@ def name_above(axes: Axes, names: Sequence[tuple[float, str]]) -> float:
     shown = [(at, colour) for at, colour in names if low <= at <= high]
     if not shown:
         return 0.0
-    places = np.array([((at - low) / (high - low), 0.0) for at, _ in shown])
+    at_hz = np.array([at for at, _ in shown])
+    if axes.get_xscale() == "log":
+        low, high, at_hz = np.log(low), np.log(high), np.log(at_hz)
+    places = np.column_stack([(at_hz - low) / (high - low), np.zeros(at_hz.size)])
     for row in spread(places, apart=(ROOM, 1.0)):
         at, colour = shown[row]
         axes.annotate(
