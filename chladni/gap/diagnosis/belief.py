@@ -103,9 +103,16 @@ class Belief:
         """Nats of what a force at a place (or two) leaves."""
         return self._left_by_force(located).at(self.level).elsewhere
 
-    def beyond(self, one: Contestant) -> float:
-        """Energy that a fit leaves beyond the noise."""
-        return one.left.at(self.level).beyond
+    def beyond(self, one: Contestant) -> Real:
+        """``[output]`` energy that a fit leaves beyond the noise, over what noise leaves; one number of windows."""
+        left = one.left
+        if not left.outputs:
+            return np.array([left.at(self.level).beyond / (left.along_expected + left.across_expected)])
+        return np.maximum(np.array(left.outputs) - self.level, 0.0)
+
+    def is_much(self, energy: Real) -> bool:
+        """Whether that is enough for a cause to be named: a share of an output's gap, and more than noise may be."""
+        return bool(np.any(energy > self.least))
 
     def _words(self, effects: Sequence[AttachedEffect]) -> float:
         """Nats of effects: each at a site of its own, or one word at several sites of a kind, as far as that is less.
@@ -167,9 +174,14 @@ class Belief:
         return tuple(sorted(found, key=lambda one: -one.nats))
 
     @cached_property
-    def least(self) -> float:
-        """Energy that a cause must explain: a share of what values alone, right or wrong, leave."""
-        return LEAST_SHARE * min(self.beyond(one) for one in self._contestants if not one.hypothesis.effects)
+    def least(self) -> Real:
+        """``[output]`` as `beyond`: what a cause must explain, a share of what values alone, right or wrong, leave.
+
+        Of any output is enough: where one has a hundredth of another one's noise, its gap alone would be the gap.
+        """
+        valued = [one for one in self._contestants if not one.hypothesis.effects]
+        gap = np.min([self.beyond(one) for one in valued], axis=0)
+        return np.asarray(LEAST_SHARE * gap + min(one.left.doubt for one in valued), dtype=np.float64)
 
     def _without_idle(self, causes: Causes, best: Mapping[Causes, Contestant]) -> list[Causes]:
         """Sets that lack one of the causes and leave hardly more than all of them do.
@@ -179,7 +191,7 @@ class Belief:
         words = Counter(one.effect for one in causes)
         alone = [one for one in causes if words[one.effect] == 1 or one.effect == PARAMETER]
         fewer = [causes - {one} for one in alone if causes - {one} in best]
-        return [one for one in fewer if self.beyond(best[one]) - self.beyond(best[causes]) < self.least]
+        return [one for one in fewer if not self.is_much(self.beyond(best[one]) - self.beyond(best[causes]))]
 
     def _unknown(self) -> float:
         return float(np.logaddexp.reduce([self.anywhere, *(self.unknown_at(one) for one in self._places)]))

@@ -105,7 +105,7 @@ class Search:
     @property
     def is_open(self) -> bool:
         """Whether the believed hypothesis leaves what another cause could be worth its price, and a name, for."""
-        return self.belief.unexplained(self.best) > WORTH and self.belief.beyond(self.best) > self.belief.least
+        return self.belief.unexplained(self.best) > WORTH and self.belief.is_much(self.belief.beyond(self.best))
 
     def over(self, study: Study) -> "Search":
         """Give the search of the same log over another floor, with what was found judged anew."""

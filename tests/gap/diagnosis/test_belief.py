@@ -127,7 +127,7 @@ def test_a_cause_that_does_nothing_is_none_where_one_floor_is_too_high() -> None
     found = [nothing, contestant(LAG, left=alone), contestant(LAG, RUB, left=beside)]
     belief = Belief(location(), [replace(one, log_evidence=one.left.log_likelihood) for one in found])
     assert belief.level == pytest.approx((0.5, 1.0, 1.0))
-    assert belief.beyond(found[1]) == belief.beyond(found[2]) == 0.0
+    assert not np.any([belief.beyond(found[1]), belief.beyond(found[2])])
     assert {one.effect for one in belief.sets[0].causes} == {LAG.kind.name}
 
 
@@ -142,6 +142,16 @@ def test_what_an_idle_cause_makes_of_another_one_is_that_one_s() -> None:
     assert all(len(one.causes) < 2 for one in belief.sets)
 
 
+def test_a_cause_of_one_sensor_counts_by_that_sensor_s_gap() -> None:
+    # The first sensor's noise is small: its gap is nearly all of the energy. The second cause is at the other one.
+    def left(*outputs: float) -> Left:
+        return replace(leaving(float(np.mean(outputs))), outputs=outputs)
+
+    nothing, lag = contestant(left=left(1e5, 60.0, 1.0)), contestant(LAG, left=left(1.0, 30.0, 1.0))
+    both = contestant(LAG, RUB, left=left(1.0, 1.0, 1.0), log_evidence=1e3)
+    assert {len(one.causes) for one in Belief(location(), [nothing, lag, both]).sets} == {0, 1, 2}
+
+
 def test_a_fit_tells_the_noise_as_far_as_the_floor_allows_and_else_the_floor_does() -> None:
     most = 1.0 + 2.0 * DOUBT
     assert Belief(location(), [contestant(left=leaving_all(most - 0.01))]).level == pytest.approx(most - 0.01)
@@ -152,10 +162,15 @@ def test_a_cause_without_which_as_little_is_left_is_none() -> None:
     lag, both = contestant(LAG, left=leaving(2.0)), contestant(LAG, RUB, left=leaving(1.99), log_evidence=1e3)
     nothing = contestant(left=leaving(50.0))
     assert {len(one.causes) for one in Belief(location(), [nothing, lag, both]).sets} == {0, 1}
-    more = contestant(LAG, RUB, left=leaving(1.0 + 1e-6), log_evidence=1e3)
+    # Of a gap of 49 times the noise the second explains 2 % and a little, beyond what the noise may be more by.
+    energy = nothing.left.beyond / (3 * LINES)
+    least = 1.5 * (SHARE * energy + OWN_DOUBT)
+    lag, more = (
+        contestant(LAG, left=leaving(1.0 + 1.001 * least)),
+        contestant(LAG, RUB, log_evidence=1e3, left=leaving(1.0)),
+    )
     belief = Belief(location(), [nothing, lag, more])
-    # Of a gap of 49 times the noise the second explains one: 2 % and a little.
-    assert belief.least == pytest.approx(SHARE * nothing.left.beyond)
+    assert belief.least == pytest.approx(SHARE * energy + OWN_DOUBT)
     assert {len(one.causes) for one in belief.sets} == {0, 1, 2}
 
 
