@@ -71,7 +71,7 @@ def _law(file: FileReading, loc: Loc, table: Content) -> Law | None:
 
 def _gain(file: FileReading, loc: Loc, found: object) -> _WithUnit | None:
     """Any unit will do: it says in what the controller's own command is measured."""
-    value = file.number(loc, found, None)
+    value = file.parameter(loc, found, None)
     if value == 0:
         file.mistakes.add(loc, f"found {shown(found)}; a gain of zero drives nothing")
     if not value:
@@ -89,7 +89,7 @@ def _limit(
     unit = command
     if isinstance(found, str) and ends is not None and ends.driven != command and _measures(found, ends.driven):
         unit = ends.driven
-    value = file.number(loc, found, unit)
+    value = file.parameter(loc, found, unit)
     if value is not None and value <= 0:
         file.mistakes.add(loc, f"found {shown(found)}; must be above zero")
         return None
@@ -106,6 +106,6 @@ def _measures(text: str, unit: str) -> bool:
 def _polynomial(file: FileReading, loc: Loc, found: object) -> tuple[float, ...] | None:
     if not isinstance(found, list):
         return None
-    read = [file.number((*loc, place), one, None) for place, one in enumerate(found)]
+    read = [file.parameter((*loc, place), one, None) for place, one in enumerate(found)]
     numbers = tuple(one for one in read if one is not None)
     return numbers if len(numbers) == len(read) else None

@@ -80,7 +80,7 @@ class FileReading:
                 self.mistakes.add((*loc, name), f"unknown {what}; {nearest(name, list(units), f'{what}s')}")
                 complete = False
                 continue
-            value = self.number((*loc, name), one, units[name])
+            value = self.parameter((*loc, name), one, units[name])
             complete = complete and value is not None
             if value is not None:
                 read[name] = value

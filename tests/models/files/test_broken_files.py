@@ -79,3 +79,12 @@ def test_any_text(tmp_path: Path, text: str) -> None:
     except UnicodeEncodeError:
         # Half a surrogate pair can't be written to a file at all.
         assert any("\ud800" <= character <= "\udfff" for character in text)
+
+
+def test_a_gain_that_equations_can_t_hold_is_told_at_its_place(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(STRUCTURE.replace('kp = "20 V/mm"', "kp = 1e308"), encoding="utf-8")
+    with pytest.raises(
+        ModelError, match=r"m\.toml:\d+: \[\[controller\]\] 1 gains kp: found 1e\+308 V/m is too large"
+    ):
+        load_model(path)
