@@ -218,7 +218,7 @@ class Search:
         progress(0.3)
         hypotheses = effect_hypotheses(candidates, count=FITS)
         values = wrong_values(location, study.contest.run.tunables)
-        elsewhere = linear_elsewhere(study.model, location, study.kinds)
+        elsewhere = linear_elsewhere(study.model, location, study.kinds, candidates)
         self.enter([*hypotheses, *elsewhere, *values], lambda done: progress(0.3 + 0.4 * done))
         return candidates, hypotheses
 

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from chladni.gap.calibration import FAR, FORMS, LESS, LITTLE, LOCATED, ROUNDING, SHARE_OF_RANGE, WIDE
+from chladni.gap.calibration import FAR, FORMS, LESS, LITTLE, LOCATED, ROUNDING, SHARE_OF_RANGE, UNLIKELY, WIDE
 from chladni.gap.explanation.hypotheses import effect_of, hypothesis_of
 from chladni.gap.explanation.hypothesis import Hypothesis
 from chladni.gap.explanation.screen import Regression, Screened
@@ -121,7 +121,9 @@ def _moved(effect: AttachedEffect, further: Real) -> AttachedEffect:
     return with_numbers((effect,), numbers, steps)[0]
 
 
-def linear_elsewhere(model: Model, location: Location, kinds: Sequence[EffectKind]) -> list[Hypothesis]:
+def linear_elsewhere(
+    model: Model, location: Location, kinds: Sequence[EffectKind], screened: Sequence[Screened]
+) -> list[Hypothesis]:
     """Fit linear effects where no place that was followed tells of them, as their first step promises; the best.
 
     An unknown force is no bound on every effect: a gyroscopic coupling is no force between two bodies, and a force is
@@ -133,12 +135,15 @@ def linear_elsewhere(model: Model, location: Location, kinds: Sequence[EffectKin
         Of the location's problem.
     kinds
         Effects that take part.
+    screened
+        Forms at the places that were followed: what leaves many times as much as the best isn't worth a fit.
     """
     if isinstance(model, BlackBox):
         return []
     followed = {name for one in location.ranked for place in one.places for name in place.names}
     scores = _Scores(model, location.problem, location.tuned)
-    found = _promised(scores, location, kinds, followed | scores.open_ended, LESS * location.tuned.chi)
+    enough = min([LESS * location.tuned.chi, *(UNLIKELY * one.chi for one in screened)])
+    found = _promised(scores, location, kinds, followed | scores.open_ended, enough)
     return [hypothesis_of((one.effect,), one.z, screened=one.chi) for one in found]
 
 

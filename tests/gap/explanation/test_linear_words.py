@@ -54,7 +54,7 @@ def test_and_named() -> None:
 def test_a_coupling_that_is_no_force_at_any_one_place_is_found_by_its_first_step() -> None:
     log = measured((chladni.attached("gyroscopic", "column~wrist", {"coefficient": 60.0}),))
     location = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
-    best = linear_elsewhere(arm(), location, WORDS)[0]
+    best = linear_elsewhere(arm(), location, WORDS, ())[0]
     (effect,) = best.effects
     assert (effect.effect, effect.site) == ("gyroscopic", "column~wrist")
     assert effect.values["coefficient"] == pytest.approx(60.0, rel=0.05)
@@ -64,7 +64,7 @@ def test_a_coupling_that_is_no_force_at_any_one_place_is_found_by_its_first_step
 def test_nothing_is_fitted_elsewhere_where_the_model_is_right() -> None:
     log = measured()
     location = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))
-    assert linear_elsewhere(arm(), location, WORDS) == []
+    assert linear_elsewhere(arm(), location, WORDS, ()) == []
 
 
 def test_a_second_linear_word_is_found_beside_a_first_one() -> None:
