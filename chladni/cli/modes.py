@@ -17,6 +17,14 @@ if TYPE_CHECKING:
     from chladni.apps.picking import ModePicking
     from chladni.io.log import Log as OpenedLog
 
+_Band = Annotated[
+    tuple[float, float] | None,
+    typer.Option(metavar="LO-HI", help="Only modes between these frequencies, in Hz.", show_default=False),
+]
+_Fmax = Annotated[
+    float | None,
+    typer.Option("--fmax", metavar="HZ", help="Only modes below this frequency.", show_default=False),
+]
 MethodName = Literal["plscf", "circle-fit", "half-power", "ssi-cov", "fdd", "efdd"]
 
 
@@ -29,14 +37,8 @@ def modes(
         bool, typer.Option("--operational", help="Use responses alone: the excitation wasn't measured.")
     ] = False,
     channel: options.Channels = None,
-    band: Annotated[
-        tuple[float, float] | None,
-        typer.Option(metavar="LO-HI", help="Only modes between these frequencies, in Hz.", show_default=False),
-    ] = None,
-    fmax: Annotated[
-        float | None,
-        typer.Option("--fmax", metavar="HZ", help="Only modes below this frequency.", show_default=False),
-    ] = None,
+    band: _Band = None,
+    fmax: _Fmax = None,
     count: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="At most so many modes.", show_default=False)
     ] = None,

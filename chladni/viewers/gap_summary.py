@@ -81,9 +81,10 @@ def _sentences(found: Diagnosis) -> Iterator[str]:
             yield from _moved(found)
         case "unknown":
             yield from _unknown(found) if found.machine is None else robot_unknown(found)
-    # Where nothing was named, or added, nothing closes.
-    if found.verdict == "parameters" or (found.verdict == "effect" and found.gap.after != found.gap.tuned):
-        yield from _closed(found.gap)
+    # Where nothing was named, or added to the model, nothing closes.
+    if found.verdict in ("effect", "parameters"):
+        if found.verdict == "parameters" or found.gap.after != found.gap.tuned:
+            yield from _closed(found.gap)
         yield from _elsewhere(found)
     yield from _how(found)
     if found.advice:

@@ -31,8 +31,8 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
         found += [one for one in told if one.probability >= NAMED]
     if causes.verdict == "effect" and study.stepping is not None:
         found += _in_steps(study, study.stepping, {one.site for one in found if one.effect == study.stepping.name})
-    if causes.verdict == "effect" and causes.best is causes.tuned and study.of_constant is not None:
-        found += _constants(study, study.of_constant, study.constants(causes.tuned.fit, causes.noise))
+    if causes.constants and study.of_constant is not None:
+        found += _constants(study, study.of_constant, causes.constants)
     return tuple(found)
 
 

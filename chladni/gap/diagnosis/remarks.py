@@ -56,7 +56,7 @@ def _constants(study: Study, causes: Causes, shown: Contestant) -> list[str]:
         f"{name} is {value:+.3g} {units[name]} beside the model all the time: an offset of the sensor, gravity or a "
         "tilt; it counts for nothing in this answer"
         for name, value in study.constants(shown.fit, causes.noise).items()
-        if shown is not causes.tuned or study.of_constant is None
+        if name not in causes.constants
     ]
 
 

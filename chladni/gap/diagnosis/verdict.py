@@ -1,7 +1,7 @@
 """What causes the gap: the fit that is believed, and the verdict."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from chladni.gap.calibration import NAMED, SOME
 from chladni.gap.diagnosis.belief import Belief
@@ -43,6 +43,8 @@ class Causes:
         Unknown forces at two places that explain much more than one anywhere, when pairs were looked for; else None.
     within_step
         Whether the best causes do less than the own step of a simulator that isn't ours.
+    constants
+        Outputs whose constant is all that is missing, with it.
     """
 
     verdict: Verdict
@@ -54,6 +56,7 @@ class Causes:
     distorted: tuple[str, ...]
     forces: Located | None = None
     within_step: bool = False
+    constants: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def ranked(self) -> tuple[Contestant, ...]:
@@ -118,14 +121,16 @@ def judged(search: Search) -> Causes:
     within_step = verdict == "effect" and _within_step(study, tuned, best)
     verdict = "unknown" if within_step else verdict
     shaken = shaken_by(study, tuned) if verdict == "unknown" else None
-    noise = study.contest.noise.lowered(best.held)
-    told_anyway = study.lattices or (study.of_constant is not None and study.constants(tuned.fit, noise))
-    if shaken is not None or (verdict == "none" and told_anyway):
+    if shaken is not None or (verdict == "none" and study.lattices):
         verdict = "effect"
     distorted = _distorted(study, tuned) if verdict in ("none", "unknown") else ()
     if verdict == "none" and (study.repeating or distorted):
         # A sensor that holds its samples moves nothing, and looks like noise; but it's no noise.
         verdict = "unknown"
+    noise = study.contest.noise.lowered(best.held)
+    alone = shaken is None and best is tuned and verdict in ("none", "effect")
+    constants = study.constants(tuned.fit, noise) if alone and study.of_constant is not None else {}
+    verdict = "effect" if constants else verdict
 
     # Only of what will be told: it costs as much as a step of a fit.
     told = study.contest.with_spread(best)
@@ -138,6 +143,7 @@ def judged(search: Search) -> Causes:
         noise=noise,
         distorted=distorted,
         within_step=within_step,
+        constants=constants,
         forces=search.forces,
     )
 

@@ -57,3 +57,12 @@ def test_left_out_it_is_told_too() -> None:
     answer = found(log(constant=30.0), words={"gain_error"})
     assert answer.verdict == "none"
     assert any("beside the model all the time" in one for one in answer.remarks)
+
+
+def test_where_something_unknown_acts_it_is_told_too() -> None:
+    made = log(constant=30.0)
+    # Nothing of the few words bends a sensor's signal.
+    bent = made.outputs[1] + 0.5 * np.abs(made.outputs[1])
+    answer = found(replace(made, outputs=np.stack([made.outputs[0], bent])))
+    assert answer.verdict == "unknown"
+    assert any("beside the model all the time" in one for one in answer.remarks)

@@ -24,7 +24,7 @@ def remarks(
     fit = SimpleNamespace(
         z=run.tunables.z({"loop.ki": found_ki}), effects=(), undetermined=undetermined, offsets=np.array(offsets)
     )
-    causes = SimpleNamespace(distorted=(), tuned=None, noise=white_floor([1e-6, 1e-6]))
+    causes = SimpleNamespace(distorted=(), constants={}, noise=white_floor([1e-6, 1e-6]))
     return remarks_on(study, causes, SimpleNamespace(fit=fit), None)
 
 

@@ -75,3 +75,9 @@ def test_a_second_linear_word_is_found_beside_a_first_one() -> None:
     best = linear_beside(arm(), location, WORDS, (late,), location.tuned.z, location.tuned.chi)[0]
     assert [(one.effect, one.site) for one in best.effects] == [("time_offset", "acc_arm"), ("added_mass", "wrist")]
     assert best.effects[1].values["mass"] == pytest.approx(1.5, rel=0.1)
+
+
+def test_the_search_names_what_is_no_force_at_any_place() -> None:
+    log = measured((chladni.attached("gyroscopic", "column~wrist", {"coefficient": 60.0}),))
+    found = diagnose(arm(), [log], leave_out=all_but("gyroscopic"))
+    assert [(one.effect, one.site) for one in found.causes] == [("gyroscopic", "column~wrist")]
