@@ -21,12 +21,12 @@ from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted, rounded_up
 from chladni.spectral.averaging import require_shapes
 from chladni.spectral.blocks import Margins, Numbers, Own
+from chladni.spectral.effective_averages import EffectiveAverages
 from chladni.spectral.held_samples import HeldSamples
 from chladni.spectral.products import PAIRS, POWERS, Products, SpectraT
 from chladni.spectral.segment_spectra import segment_spectra
 from chladni.spectral.segmentation import SHORTEST_SEGMENT, Segmentation
 from chladni.spectral.stretches import Stretch, valid_runs
-from chladni.spectral.uncertainty import EffectiveAverages
 from chladni.spectral.windows import noise_bandwidth_bins, window_name, window_samples
 
 SegmentAveraging = Literal["linear", "exponential", "peak-hold"]

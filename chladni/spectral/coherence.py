@@ -12,7 +12,6 @@ from chladni.spectral.channel_choice import choose_channels
 from chladni.spectral.cross_spectra import spectra_of
 from chladni.spectral.line_algebra import conditioned_density, solve_lines
 from chladni.spectral.psd import auto_densities
-from chladni.spectral.uncertainty import coherence_std
 from chladni.spectral.windows import Window
 
 # What is left of a channel after its own double was taken out is rounding: not more than this share of its power.
@@ -169,3 +168,13 @@ def share(part: Real, whole: Real) -> Real:
     """Give part/whole within 0 to 1; 0 where the whole is 0. Rounding may lift a part above its whole."""
     ratio = np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
     return np.asarray(np.clip(ratio, 0.0, 1.0), dtype=np.float64)
+
+
+def coherence_std(coherence: Real, averages: float) -> Real:
+    """One sigma of a coherence, sqrt(2) (1 - c) sqrt(c) / sqrt(n) (Bendat & Piersol 2010, table 9.6).
+
+    Infinite when one average or less went in: such a coherence is 1 whatever the data.
+    """
+    if averages <= 1:
+        return np.full(coherence.shape, np.inf)
+    return np.asarray((1 - coherence) * np.sqrt(2 * coherence / averages), dtype=np.float64)

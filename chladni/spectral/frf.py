@@ -12,10 +12,10 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.spectral.channel_choice import ChannelChoice, choose_channels
 from chladni.spectral.coherence import share
 from chladni.spectral.excitation import HAMMER_RANGE, excitation_notes, excited_lines, repeated_density
+from chladni.spectral.frf_error import periodic_response_std, response_std
 from chladni.spectral.line_algebra import LineSolution, solve_lines
 from chladni.spectral.psd import auto_densities
 from chladni.spectral.response_advice import response_notes
-from chladni.spectral.uncertainty import periodic_response_std, response_std
 
 Estimator = Literal["H1", "H2", "Hv"]
 ESTIMATORS = ("H1", "H2", "Hv")

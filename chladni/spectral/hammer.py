@@ -6,13 +6,11 @@ import numpy as np
 
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.unit_text import with_unit
-from chladni.spectral.force_pulses import NOISE_SIGMAS, Pulses, is_clipped, typical_peak
+from chladni.spectral.double_hit import second_pulse
+from chladni.spectral.force_pulses import Pulses, is_clipped, typical_peak
 
 # At equal noise, a hit of a quarter of the usual force has a sixteenth of the usual ratio of signal to noise power.
 WEAK_SHARE = 0.25
-# A softer blow lasts longer (Hertz: as its speed to the power of -1/5); what's much shorter than the first is the
-# ringing of an anti-alias filter.
-LIKE_THE_FIRST = 0.75
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,17 +122,10 @@ class Judge:
         return f"overload: {', '.join(over)}" if over else ""
 
     def _double_hit(self, at: int, inside: slice) -> str:
-        # Imported here, since scipy.signal costs most of a second and most logs hold no hammer.
-        from scipy.signal import find_peaks
-
         force, peak = self.pulses.force, int(self.pulses.peaks[at])
-        rise = max(self.double_hit_share * float(force[peak]), NOISE_SIGMAS * self.pulses.noise)
-        tops, _ = find_peaks(force[inside], prominence=rise, width=LIKE_THE_FIRST * self.pulses.widths[at])
-        # The main pulse is found too, and where its crest is flat not at its first sample.
-        others = [top for top in (tops + inside.start).tolist() if abs(top - peak) > self.pulses.widths[at] / 2]
-        if not others:
+        second = second_pulse(self.pulses, at, inside, share=self.double_hit_share)
+        if second is None:
             return ""
-        second = max(others, key=lambda top: float(force[top]))
         height = with_unit(f"{force[second]:.3g}", self.pulses.unit)
         return (
             f"double hit: a second pulse of {height} ({force[second] / force[peak]:.0%}), "

@@ -18,7 +18,7 @@ from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.provenance import Provenance
 from chladni.signals.renamed import renamed
 from chladni.spectral.leakage import leakage, line_correlation, named_window
-from chladni.spectral.uncertainty import std_or_scatter
+from chladni.spectral.line_scatter import std_or_scatter
 from chladni.spectral.windows import noise_bandwidth_bins
 
 # The floor around a line is the median of a tenth of the spectrum, of this many lines at least.

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import coherence as scipy_coherence
 
 from chladni.signals.errors import EstimateError
-from chladni.spectral.coherence import coherence, partial_coherence, share
+from chladni.spectral.coherence import coherence, coherence_std, partial_coherence, share
 from chladni.spectral.cross_spectra import cross_spectra
 from tests.spectral.made_signals import noise, series
 
@@ -106,3 +106,13 @@ def test_a_share_stays_between_nothing_and_all():
 def test_a_channel_named_twice_is_refused():
     with pytest.raises(EstimateError, match="named twice"):
         partial_coherence(two_sources(), references="a", conditioned_on=["a"])
+
+
+def test_one_average_leaves_the_error_of_a_coherence_open():
+    assert np.all(np.isinf(coherence_std(np.ones(3), 1.0)))
+
+
+def test_a_coherence_of_one_has_no_error_and_a_middle_one_scatters_as_tabled():
+    np.testing.assert_allclose(
+        coherence_std(np.array([0.0, 0.5, 1.0]), 50.0), [0, np.sqrt(2) * 0.5 * np.sqrt(0.5 / 50), 0], rtol=1e-12
+    )

@@ -14,9 +14,9 @@ from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.unit_text import in_unit
 from chladni.signals.wording import counted
 from chladni.spectral.forms import MOTION_ORDER, convert_form
+from chladni.spectral.line_scatter import std_or_scatter
 from chladni.spectral.peaks import find_response_peaks
 from chladni.spectral.response_advice import half_power_lines
-from chladni.spectral.uncertainty import std_or_scatter
 
 DrivingPointVerdict = Literal["sound", "reversed", "not a driving point", "phase error", "undecided"]
 # A phase that amplifiers and filters may add without a sensor being wrong (ISO 7626-2 asks for matched channels).

@@ -11,7 +11,7 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.value import Value
 from chladni.spectral.forms import ORDER, Form
-from chladni.spectral.uncertainty import std_or_scatter
+from chladni.spectral.line_scatter import std_or_scatter
 
 # Lines over which a sigma from few averages is steadied: with three averages each, nine lines know it to a fifth.
 STEADY_LINES = 9

@@ -12,8 +12,8 @@ from chladni.signals.errors import EstimateError
 from chladni.signals.provenance import Provenance
 from chladni.signals.value import Value
 from chladni.signals.wording import counted
+from chladni.spectral.effective_averages import window_correlation
 from chladni.spectral.leakage import named_window
-from chladni.spectral.uncertainty import window_correlation
 
 # Below so many effective averages the scatter of a line is as large as itself, and no peak can be told from it.
 LEAST_AVERAGES = 4.0
