@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
 from chladni.apps.findings import reading_sentences
 from chladni.apps.modes import Method, Wanted, functions_and_modes, modes_of_responses
@@ -28,6 +28,7 @@ from chladni.signals.errors import EstimateError, SetupError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.mode_validation import ModeValidation
+from chladni.signals.shown_units import in_units, synthesis_in_units
 from chladni.signals.study import Study
 
 MethodName = Literal["plscf", "circle-fit", "half-power", "ssi-cov", "fdd", "efdd"]
@@ -51,6 +52,23 @@ class ModalStudy:
     validation: ModeValidation
     transmissibility: tuple[ShapeTransmissibility, ...]
     study: Study
+
+    def drawn_in(self, units: Sequence[str] | None) -> Self:
+        """Give it with the functions that are drawn in other units: ``"g"``, ``"kN"``; None leaves all in SI.
+
+        Raises
+        ------
+        SetupError
+            When no channel is of such a quantity, or there are no functions, since no force was measured.
+        """
+        if not units:
+            return self
+        if self.study.response is None:
+            raise SetupError(
+                f"--unit {units[0]}: modes of responses alone have no functions, and shapes no unit; drop it"
+            )
+        modes = synthesis_in_units(self.modes, units)
+        return replace(self, study=replace(self.study, response=in_units(self.study.response, units), modes=modes))
 
 
 def modal_study(

@@ -59,6 +59,7 @@ def modes(
     part: options.Part,
     join: options.Join = "auto",
     opener: Opener,
+    unit: options.Unit = None,
     looks: options.Looks,
     targets: options.Targets,
     uff: Annotated[
@@ -85,7 +86,7 @@ def modes(
             picking = _picking(out, opened, wanted=wanted, **given)
             wanted = _kept(out, picking, wanted, port=port, open_page=open_page)
         with out.progress(log.name) as progress:
-            found = modal_study(opened, wanted=wanted, progress=progress, **given)
+            found = modal_study(opened, wanted=wanted, progress=progress, **given).drawn_in(unit)
     print_modes(out, found.modes, found.validation)
     print_relative_motion(out, found.modes, found.study.relative_motion)
     out.lines(found.study.findings)

@@ -8,6 +8,7 @@ import numpy as np
 
 from chladni.signals.channel import UNKNOWN, Channel, Names, as_names
 from chladni.signals.errors import SetupError
+from chladni.signals.mode_set import ModeSet
 from chladni.signals.units import si_factor
 from chladni.signals.value import Value
 
@@ -66,6 +67,25 @@ def all_in_units(values: Sequence[ValueT], units: Names | None) -> tuple[ValueT,
         if si_unit not in held:
             raise SetupError(_misfit(unit, si_unit, list(dict.fromkeys(held))))
     return tuple(_shown(value, asked) for value in values)
+
+
+def synthesis_in_units(modes: ModeSet, units: Names | None) -> ModeSet:
+    """Give modes whose synthesised functions, and channels, are in other units, see `in_units`.
+
+    Shapes stay as they are: ratios of SI, which don't change where all responses are of one quantity.
+    """
+    if not units or modes.fit is None:
+        return modes
+    asked = _by_si(as_names(units))
+    shown, over = ([asked.get(one.unit, one.unit) for one in of] for of in (modes.channels, modes.references))
+    response, reference = (np.array([si_factor(unit)[0] for unit in names]) for names in (shown, over))
+    factors = (reference / response[:, np.newaxis])[..., np.newaxis]
+    return replace(
+        modes,
+        channels=tuple(replace(one, unit=unit) for one, unit in zip(modes.channels, shown, strict=True)),
+        references=tuple(replace(one, unit=unit) for one, unit in zip(modes.references, over, strict=True)),
+        fit=replace(modes.fit, synthesised=modes.fit.synthesised * factors),
+    )
 
 
 def _by_si(units: Sequence[str]) -> dict[str, str]:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+import chladni
+from chladni.apps.modal_study import modal_study
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
 from chladni.signals.study import Study
@@ -15,6 +17,7 @@ from chladni.signals.time_series import TimeSeries
 from chladni.viewers import figures
 from chladni.viewers.figures import Album, density_figures, response_figures
 from chladni.viewers.figures.log_axis import Scales
+from chladni.viewers.overlays import overlay_pages
 from tests.cli.conftest import Run
 
 RATE_HZ = 500.0
@@ -128,3 +131,22 @@ def test_fmax_is_the_upper_end_of_the_band(run: Run, log: Path) -> None:
     refused = run("modes", log, "--band", "20-100", "--fmax", 10)
     assert (refused.code, refused.err.count("\n")) == (2, 1)
     assert "--fmax 10 leaves no frequency; give one above 20 Hz" in refused.err
+
+
+def test_functions_and_their_synthesis_are_drawn_in_the_unit_asked_for(run: Run, log: Path) -> None:
+    found = modal_study(chladni.open(log))
+    shown = found.drawn_in(["g"])
+    response, modes = shown.study.response, shown.study.modes
+    assert response is not None
+    assert modes is not None
+    assert modes.fit is not None
+    assert response.unit(0, 0) == "g/N"
+    assert found.study.response is not None
+    assert found.modes.fit is not None
+    np.testing.assert_allclose(response.values * 9.80665, found.study.response.values, rtol=1e-12)
+    np.testing.assert_allclose(modes.fit.synthesised * 9.80665, found.modes.fit.synthesised, rtol=1e-12)
+    (page,) = overlay_pages(modes, response)
+    assert page.unit == "g/N"
+    np.testing.assert_array_equal(shown.modes.shapes, found.modes.shapes)
+    assert "g, m/s^2" in run("modes", log, "--unit", "mm").err
+    assert "responses alone" in run("modes", log, "--operational", "--unit", "g").err
