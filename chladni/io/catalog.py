@@ -137,7 +137,10 @@ class Catalog:
         if parsed.topic not in self.topics:
             raise LogError(f"{path!r}: messages of {parsed.topic} can't be decoded: {self.refused[parsed.topic]}")
         if not parsed.steps:
-            names = [one.channel.name for one in self.channels if one.topic == parsed.topic]
+            of_topic = [one for one in self.channels if one.topic == parsed.topic]
+            if len(of_topic) == 1:
+                return of_topic[0]
+            names = [one.channel.name for one in of_topic]
             raise LogError(f"{path!r} is a topic; name a channel of it; {near_matches(path, names)}")
         source = self.topics[parsed.topic].resolve(parsed)
         self._require_one_publisher(parsed, source)

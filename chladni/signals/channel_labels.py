@@ -71,6 +71,20 @@ def _endings_of_others(labels: dict[str, str], known: Sequence[str]) -> Counter[
     return found
 
 
+def topic_of(name: str) -> str:
+    """Topic that a name begins with: what stands before its fields; all of a name without fields.
+
+    Examples
+    --------
+    >>> topic_of("/motor/force.value"), topic_of("tip")
+    ('/motor/force', 'tip')
+    """
+    pieces = _PIECE.findall(name)
+    last_slash = max((place for place, piece in enumerate(pieces) if piece == "/"), default=-1)
+    first_dot = next((place for place in range(last_slash + 1, len(pieces)) if pieces[place] == "."), len(pieces))
+    return "".join(pieces[:first_dot])
+
+
 def _split(name: str) -> tuple[Sequence[str], Sequence[str]]:
     """Parts of the topic and fields after it; separators inside brackets, braces and quotes don't count."""
     pieces = _PIECE.findall(name)

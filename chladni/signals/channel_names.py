@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from chladni.signals.channel_labels import BOUNDARY, is_short_for, short_names
+from chladni.signals.channel_labels import BOUNDARY, is_short_for, short_names, topic_of
 from chladni.signals.errors import EstimateError
 from chladni.signals.visible import place_of, visible
 from chladni.signals.wording import near_matches, near_words
@@ -30,7 +30,8 @@ def places_of(word: str, known: Sequence[str], *, role: str = "channel") -> tupl
     ----------
     word
         A name as it is or as it's shown; else an ending of one name alone, which begins where a word begins; else the
-        label of one, see `short_names`; else a pattern of whole names or such endings, which may mean several.
+        label of one, see `short_names`; else an ending of the one topic that has one channel; else a pattern of whole
+        names or such endings, which may mean several.
     known
         Names there are.
     role
@@ -51,6 +52,8 @@ def places_of(word: str, known: Sequence[str], *, role: str = "channel") -> tupl
     >>> names = ["/a/imu.accel.x", "/a/imu.accel.y", "/b/wing_rail.x"]
     >>> places_of("rail.x", names), places_of("accel.y", names), places_of("*.x", names), places_of("ail.x", names)
     ((2,), (1,), (0, 2), ())
+    >>> places_of("force", ["/motor/force.value", "/motor/current.value"])
+    (0,)
     >>> places_of("base.x", ["/imu/base.accel.linear.x", "/imu/wrist.accel.linear.x"])
     (0,)
     """
@@ -76,7 +79,15 @@ def places_of(word: str, known: Sequence[str], *, role: str = "channel") -> tupl
             f"{word!r} is short for {len(found)} {role}s: {_some([known[place] for place in found])}; "
             f"give one as it is listed here"
         )
-    return found
+    return found or _only_of_topic(told, known)
+
+
+def _only_of_topic(word: str, known: Sequence[str]) -> tuple[int, ...]:
+    """Give the place of the one channel of the one topic that ends so, as ``/force`` has ``/force.value`` alone."""
+    topics = [visible(topic_of(name)) for name in known]
+    ending = re.compile(BOUNDARY + re.escape(word) + r"\Z")
+    found = [place for place, topic in enumerate(topics) if ending.search(topic)]
+    return tuple(found) if len(found) == 1 else ()
 
 
 def unknown(word: str, known: Sequence[str], *, role: str = "channel") -> str:

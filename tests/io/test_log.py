@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from chladni.io.log import Log, open_log
+from chladni.io.mcap.writer import write_mcap
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import LogError, SetupError
 from chladni.signals.testing import assert_close
@@ -166,6 +167,15 @@ def test_paths_that_name_nothing(imu_log: tuple[Log, Real], path: str, told: str
     log, _ = imu_log
     with pytest.raises(LogError, match=told):
         log.read([path])
+
+
+def test_a_topic_of_one_channel_is_that_channel(tmp_path: Path) -> None:
+    made = TimeSeries.from_arrays({"force": [1.0, 2.0, 3.0], "tip": [4.0, 5.0, 6.0]}, sample_rate_hz=10.0, units="N")
+    write_mcap([made], tmp_path / "named.mcap")
+    log = open_log(tmp_path / "named.mcap")
+    assert [one.name for one in log.channels] == ["/force.value", "/tip.value"]
+    for word in ("force", "/force", "/force.value"):
+        assert log.read(word).values.tolist() == [[1.0, 2.0, 3.0]]
 
 
 def test_nothing_asked_for(imu_log: tuple[Log, Real]) -> None:

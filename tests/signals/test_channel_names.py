@@ -53,6 +53,24 @@ def test_words_name_channels(word: str, names: list[str]) -> None:
     assert told(word) == names
 
 
+@pytest.mark.parametrize(
+    ("word", "places"),
+    [
+        ("/motor/force", (0,)),
+        ("force", (0,)),
+        ("motor/force", (0,)),
+        # Of a topic of several channels, and of two topics that end so, none is meant; nor is part of a field's path.
+        ("imu", ()),
+        ("current", ()),
+        ("orce", ()),
+        ("nested.field", ()),
+    ],
+)
+def test_a_topic_of_one_channel_names_it(word: str, places: tuple[int, ...]) -> None:
+    names = ["/motor/force.value", "/imu.x", "/imu.y", "/a/current.data", "/b/current.data"]
+    assert places_of(word, [*names, "/nested.field.x"]) == places
+
+
 def test_a_dot_in_a_pattern_is_a_dot() -> None:
     assert places_of("*a.x", ["/a.x", "/a_x", "/abx"]) == (0,)
 
