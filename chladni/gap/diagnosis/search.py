@@ -131,9 +131,8 @@ class Search:
 
     def _begin(self, progress: Step) -> None:
         candidates, hypotheses = self._one_cause(progress)
-        if self.is_open and self._other_holds() and self.is_open:
-            candidates, hypotheses = self._one_cause(progress)
         self._linear_pairs()
+        self._other_holds()
         if self.is_open and self.best.hypothesis.freed:
             # Where an unknown force acts shows only behind the values that are wrong.
             self.add(second_causes(self.study, self.best))
@@ -150,6 +149,7 @@ class Search:
         for _ in range(CAUSES):
             if self._forces_end_it or not (self.is_open and self._one_more(progress)):
                 break
+        self._other_holds()
         self._settle()
         progress(1.0)
 
@@ -166,27 +166,26 @@ class Search:
             return False
         return sensors > 2 and any(len(one.places) < sensors and self.belief.elsewhere(one) < WORTH for one in tried)
 
-    def _other_holds(self) -> bool:
-        """Ask what inputs did between samples behind the leading causes, which may have hidden it; whether it's new.
+    def _other_holds(self) -> None:
+        """Ask what inputs did between samples behind the leading causes, which may have hidden it.
 
-        What acts at an input itself could be any hold as far as an unknown force there tells.
+        What acts at an input itself could be any hold as far as an unknown force there tells. Where a hold leaves
+        more than noise and details of laws, what else is missing may pass for it.
         """
         study = self.study
-        leads = [one.best for one in self.belief.sets if one.causes][:PLACES]
+        leads = [one.best for one in self.belief.sets if one.causes][:PLACES] if self.is_open else []
         model, nats = study.model, max((one.log_evidence for one in leads), default=0.0)
-        for others in other_holds(study.model, study.measurement):
+        for others in other_holds(study.model, study.measurement) if leads else ():
             for other in [model.with_holds(one) for one in others]:
                 found = contest_over(study, other).enter_all([_from_fit(one) for one in leads])
-                told = max((one.log_evidence for one in found), default=-np.inf)
-                if told > nats + BEYOND_DOUBT:
-                    model, nats = other, told
-        if model is study.model:
-            return False
-        begun = [_from_fit(one.best) for one in self.belief.sets[:BEGUN] if one.causes]
-        study, self._tried = over_model(study, model), set()
-        self.begin_anew(study, [_without_cause(study)])
-        self.enter(begun)
-        return True
+                best = max(found, key=lambda one: one.log_evidence, default=leads[0])
+                if best.log_evidence > nats + BEYOND_DOUBT and self.belief.unexplained(best) < WORTH:
+                    model, nats = other, best.log_evidence
+        if model is not study.model:
+            begun = [_from_fit(one.best) for one in self.belief.sets[:BEGUN] if one.causes]
+            study, self._tried = over_model(study, model), set()
+            self.begin_anew(study, [_without_cause(study)])
+            self.enter(begun)
 
     def _share(self) -> None:
         """Look whether the words of what leads act at all parts of their kinds: one fit each."""

@@ -12,8 +12,9 @@ from chladni.gap.diagnosis.study import study_of
 from chladni.gap.explanation.hypotheses import hypothesis_of, siblings, twins
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.catalogue import CATALOGUE, taking_part
-from tests.gap.arm import arm, measured
-from tests.gap.made_log import band_noise, chain
+from tests.gap.arm import all_but, arm, measured, with_outputs
+from tests.gap.diagnosis.test_told_holds import made as driven
+from tests.gap.made_log import RATE_HZ, band_noise, chain
 from tests.gap.made_log import measured as made
 
 
@@ -106,3 +107,34 @@ def test_a_second_cause_is_named_where_it_is_a_share_of_the_gap_that_a_model_is_
     found = diagnose(machine, [log], leave_out=out)
     expected = {("hardening_stiffness", "j0")} | ({("gain_error", "a1")} if gain > 1.1 else set())
     assert {(one.effect, one.site) for one in found.causes} == expected
+
+
+# Of two sensors forces at two places leave nothing, whatever they are.
+@pytest.mark.parametrize(
+    "outputs",
+    [("acc_column", "acc_arm", "acc_wrist"), pytest.param(("acc_arm", "acc_wrist"), marks=pytest.mark.nightly)],
+)
+def test_a_load_and_a_late_sensor_are_named_together_and_pass_for_no_hold(outputs: tuple[str, ...]) -> None:
+    # Half a sample is what another hold of the input shifts all by: with the load alone it left a tenth less.
+    late = attached("time_offset", "acc_arm", {"offset": 8e-4})
+    load = attached("added_mass", "wrist", {"mass": 1.5})
+    log = with_outputs(measured((late, load)), outputs)
+    search = Search(study_of(arm(), log, leave_out=all_but("added_mass", "mounting_resonance"), own={}))
+    search.run(lambda _: None)
+    named = {(one.effect, one.site): one.values for one in search.best.fit.effects}
+    assert set(named) == {("time_offset", "acc_arm"), ("added_mass", "wrist")}
+    assert named["time_offset", "acc_arm"]["offset"] == pytest.approx(8e-4, rel=0.01)
+    assert search.study.model.compile().holds == arm().compile().holds
+
+
+@pytest.mark.nightly
+def test_a_hold_is_told_behind_a_cause_that_hid_it() -> None:
+    # An unknown force at the input is any hold: only with the delay known the log tells which.
+    late = attached("delay", "hammer", {"delay": 3.0 / RATE_HZ})
+    nominal, log, _ = driven("zoh", "low-passed", 0.01, 3, effects=[late])
+    out = frozenset(CATALOGUE) - {"delay", "gain_error", "lag"}
+    search = Search(study_of(nominal, log, leave_out=out, own={}))
+    search.run(lambda _: None)
+    assert [(one.effect, one.site) for one in search.best.fit.effects] == [("delay", "hammer")]
+    assert search.best.fit.effects[0].values["delay"] == pytest.approx(3.0 / RATE_HZ, abs=0.1 / RATE_HZ)
+    assert search.study.model.compile().holds == ("zoh",)
