@@ -115,7 +115,7 @@ class Answer:
         while True:
             found = trial.of([one.term for one in named])
             if found is None or not np.all(np.isfinite([found.before, found.tuned, found.after])):
-                return named, None, found
+                return named if _is_better(_of_torques(self.solved, [one.term for one in named])) else (), None, found
             first = first or found
             if not named:
                 return (), first, first
@@ -209,6 +209,11 @@ class Answer:
             answer_set=tuple(dict.fromkeys(each for one in self.weighed for each in (one.candidate, *one.others))),
             coverage=COVERAGE,
         )
+
+
+def _is_better(torques: Closing) -> bool:
+    """Whether no more torque is missing than without what was found, nor than there is: as of positions."""
+    return torques.after <= min(torques.tuned, 1.0)
 
 
 def _without_worst(named: tuple["Weighed", ...], found: Confirmed) -> tuple["Weighed", ...]:

@@ -20,7 +20,7 @@ def remarks_on(solved: Solved, unexplained: Sequence[str], *, named: bool) -> tu
         *torques.robot.remarks,
         *torques.log.remarks,
         *_of_joints(solved),
-        *(_pulled(one) for one in pulled_masses(solved)),
+        *(of_a_pulled_mass(one) for one in pulled_masses(solved)),
         *(_pushed(one) for one in solved.pushes if named),
         *(
             [f"at {some_of(unexplained)} no word explains what is missing beside the named causes"]
@@ -37,7 +37,8 @@ def _pushed(one: Push) -> str:
     )
 
 
-def _pulled(one: Pulled) -> str:
+def of_a_pulled_mass(one: Pulled) -> str:
+    """Say by how much the log asks for another mass, and where."""
     first, *others = one.links
     whose = f"{first} with {some_of(others)}" if others else first
     way = "more" if one.change > 0 else "less"

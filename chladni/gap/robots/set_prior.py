@@ -55,8 +55,9 @@ class SetPrior:
             alone = (log(ANOTHER) - every) * (len(chosen) - 1)
             shared = log(ANOTHER) - self._which(word, chosen) if len(chosen) > 1 else -np.inf
             nats += log(ANOTHER) - every + max(alone, shared)
-        # What machines rarely have is one thing more than what most have.
-        nats += log(ANOTHER) * sum(term.rare for term in terms)
+        # What machines rarely have is one thing more than what most have; two joints that are coupled are one thing.
+        nats += log(ANOTHER) * sum(term.rare and not term.is_coupling for term in terms)
+        nats += log(ANOTHER) * len({term.site for term in terms if term.rare and term.is_coupling})
         # A form that was chosen among several was one of them by chance.
         forms = [term.form for term in terms if term.form is not None]
         nats -= sum(log(one.count) + 0.5 * (one.value / one.usual) ** 2 for one in forms)

@@ -89,6 +89,16 @@ def test_a_word_at_all_that_are_alike_is_one_thing(rubbing: Contest) -> None:
     assert unlike.nats(knees) == unlike.nats(one_leg)
 
 
+def test_that_two_joints_are_coupled_is_one_thing_however_many_laws_it_takes(rubbing: Contest) -> None:
+    left, right = "left_hip~left_knee", "right_hip~right_knee"
+    dry, wet, other = (
+        *terms(rubbing, "coulomb_friction", left), *terms(rubbing, "viscous_friction", left),
+        *terms(rubbing, "viscous_friction", right),
+    )  # fmt: skip
+    # A thing more costs a factor of ten.
+    assert rubbing.prior.nats([dry, wet]) - rubbing.prior.nats([dry, other]) == pytest.approx(np.log(10.0))
+
+
 def test_both_knees_rub_and_what_they_share_makes_that_more_probable(rubbing: Contest) -> None:
     best = searched(rubbing)
     assert {one.key for one in best.terms} == {("coulomb_friction", knee) for knee in KNEES}
