@@ -152,6 +152,7 @@ class Result(_Document):
     gap: Gap | None = None
     where: dict[str, Any] | None = None
     tuned_parameters: dict[str, Any] | None = None
+    remarks: list[str] | None = None
 
 
 CASE_FORMAT, TRUTH_FORMAT = "chladni.blind-case/1", "chladni.blind-truth/1"

@@ -1,5 +1,6 @@
 """Marks one answer against the truth."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
@@ -73,6 +74,8 @@ class Mark:
         How far each unknown gain of a servo is off, as a share.
     told
         Whether an answer ``unknown`` says where, and of a push when.
+    remarked
+        Wrong masses whose link a remark names, with the sense in which it's wrong.
     """
 
     name: str
@@ -91,6 +94,7 @@ class Mark:
     values: Mapping[tuple[str, str], float] = field(default_factory=dict)
     gains: tuple[float, ...] = ()
     told: bool = False
+    remarked: tuple[tuple[str, str], ...] = ()
 
     @property
     def named(self) -> tuple[Cause, ...]:
@@ -158,6 +162,10 @@ class Mark:
     def all_found(self, *, least: float = 0.0) -> bool:
         """Whether all that is hidden was named, at its sites."""
         return self.found(least=least) == len(self._asked)
+
+    def all_told(self) -> bool:
+        """Whether each thing that is hidden was named, or a remark tells it."""
+        return all(one in self.remarked or any(cause.fits(*one) for cause in self.named) for one in self._asked)
 
     def wrongly_named(self, least: float) -> bool:
         """Whether anything was named, with a probability of `least` or more, that isn't true."""
@@ -242,6 +250,7 @@ def _marked(name: str, truth: Truth, result: Result | None) -> Mark:
             for key, value in both.items()
         ),
         told=answer.verdict == "unknown" and any(_tells(answer, one) for one in truth.effects),
+        remarked=tuple(key for key, one in hidden.items() if _is_remarked(one, answer.remarks or ())),
     )
 
 
@@ -308,6 +317,18 @@ def _tells(answer: Result, hidden: folders.Hidden) -> bool:
     ]
     middle = 0.5 * sum(float((hidden.parameters or {}).get(key, inf)) for key in ("start", "end"))
     return placed and any(low is not None and high is not None and low <= middle <= high for low, high in spans)
+
+
+def _is_remarked(hidden: folders.Hidden, remarks: Sequence[str]) -> bool:
+    """Whether a remark says of a link's mass what is wrong with it: at which link, or what moves with it; and how."""
+    link, _, what = hidden.site.rpartition(".")
+    numbers = hidden.parameters or {}
+    true, nominal = (_number(numbers.get(key)) for key in ("true", "nominal"))
+    if hidden.effect != PARAMETER or what != "mass" or true is None or nominal is None:
+        return False
+    way = "more" if true > nominal else "less"
+    says = re.compile(rf"the log asks for .* kg {way} at (.*[ ,])?{re.escape(link)}([ ,].*)?")
+    return any(says.fullmatch(one) for one in remarks)
 
 
 def _ordered(site: str) -> str:

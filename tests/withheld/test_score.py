@@ -7,6 +7,8 @@ from functools import reduce
 
 import pytest
 
+from chladni.gap.robots.remarks import of_a_pulled_mass
+from chladni.gap.robots.tuned import Pulled
 from chladni.signals.errors import SetupError
 from chladni_withheld.folders import read_json, seal_case
 from chladni_withheld.marking import mark
@@ -535,3 +537,29 @@ def test_what_is_no_json_is_told_with_its_file(tmp_path, text):
 def test_a_truth_that_hides_nothing_though_its_kind_does_is_refused():
     with pytest.raises(SetupError, match="x: kind is two, and effects holds none"):
         mark("x", {"kind": "two", "effects": []}, RESULT)
+
+
+@pytest.mark.parametrize(
+    ("pulled", "told"),
+    [
+        ({}, True),
+        ({"links": ("tool", "hand")}, True),
+        ({"links": ("arm",), "instead": ("hand",)}, True),
+        ({"change": -0.1}, False),
+        ({"links": ("arm",)}, False),
+        ({"links": ("hand_left",)}, False),
+    ],
+)
+def test_a_heavier_link_is_told_by_a_remark_too(pulled, told):
+    numbers = {"nominal": 1.0, "true": 1.04}
+    truth = {"kind": "ordinary", "effects": [
+        {"effect": "delay", "site": "all commands"},
+        {"effect": "parameter", "site": "hand.mass", "parameters": numbers},
+    ]}  # fmt: skip
+    own = {"links": ("hand",), "instead": (), "change": 0.04, "std": 0.01, "over_tolerance": 4.0}
+    cause = {"effect": "delay", "site": "all commands", "probability": 0.9}
+    result = {"format": "chladni.gap/1", "verdict": "effect", "causes": [cause],
+              "remarks": [of_a_pulled_mass(Pulled(**(own | pulled)))]}  # fmt: skip
+    score = scored([mark("x", truth, result)])["robots"]
+    assert score["ordinary_told"]["right"] == told
+    assert score["ordinary"]["right"] == 0
