@@ -228,11 +228,11 @@ def _against(one: str, several: str, text: str, name: str) -> Callable[[Cause], 
 
 
 def _spring(cause: Cause) -> Told:
-    names: tuple[str, ...] = ("stiffness", "rest")
-    text = " a spring of {} about {}"
-    if "ratio" in cause.parameters:
-        names, text = (*names, "ratio"), f"{text} of the first position and {{}} times the second"
-    return _says("has", "have", text, *names)(cause)
+    if "ratio" not in cause.parameters:
+        return _says("has", "have", " a spring of {} about {}", "stiffness", "rest")(cause)
+    first, second = cause.site.split("~")
+    text = f" a spring of {{}} over {first} and {{}} times {second}, at rest at {{}}"
+    return _says("has", "have", text, "stiffness", "ratio", "rest")(cause)
 
 
 def _other(cause: Cause) -> Told:

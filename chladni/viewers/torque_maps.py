@@ -8,8 +8,8 @@ from chladni.signals.arrays import Index
 
 #: A few wild samples of a differentiated motion must not flatten all others.
 SHOWN, ROOM = 99.0, 1.15
-#: Letters of two joints' names that have room below a small picture.
-LONGEST = 28
+#: Letters of a motion's name that have room below a small picture, beside its unit.
+LONGEST = 34
 
 
 def maps_over(found: Diagnosis, over: Over) -> list[TorqueMap]:
@@ -22,11 +22,12 @@ def motion_name(one: TorqueMap) -> str:
     if one.ratio is None:
         return one.over
     share = "" if abs(one.ratio) == 1.0 else f"{abs(one.ratio):.3g} × "
+    sign = "−" if one.ratio < 0 else "+"
     first, second = one.site.split("~")
-    if len(first) + len(second) > LONGEST:
-        # The title names both, in this order.
-        first, second = "the first", "the second"
-    return f"{one.over} of {first} {'−' if one.ratio < 0 else '+'} {share}{second}"
+    named = f"{first} {sign} {share}{second}"
+    # Where the names have no room: the title has both, in this order.
+    ways = (f"{one.over} of {named}", named, f"{one.over} of 1st {sign} {share}2nd")
+    return next((way for way in ways if len(way) <= LONGEST), ways[-1])
 
 
 def torque_range(one: TorqueMap) -> tuple[float, float]:

@@ -187,8 +187,8 @@ def test_a_robot_that_no_simulation_holds_is_drawn_as_measured(found: Diagnosis,
     ("site", "ratio", "told"),
     [
         ("joint_5~joint_6", 1.0, "velocity of joint_5 + joint_6"),
-        ("joint_5~joint_6", -0.5, "velocity of joint_5 − 0.5 × joint_6"),
-        ("left_shoulder_pitch~left_shoulder_roll", 2.0, "velocity of the first + 2 × the second"),
+        ("joint_5~joint_6", -0.5, "joint_5 − 0.5 × joint_6"),
+        ("left_shoulder_pitch~left_shoulder_roll", 2.0, "velocity of 1st + 2 × 2nd"),
     ],
 )
 def test_a_pair_says_which_sum_of_two_motions_it_is_drawn_over(

@@ -94,6 +94,8 @@ def test_a_spring_over_two_joints_is_told_at_both(tmp_path: Path) -> None:
         assert found.causes[0].parameters[name].value == pytest.approx(value, rel=0.05)
     told = f"{found.causes[0].parameters['stiffness'].value:.4f}"
     assert f"shoulder with elbow has a spring of {told} " in headline(found)
+    assert "over shoulder and 0.7" in headline(found)
+    assert "times elbow, at rest at -" in headline(found)
 
 
 def test_friction_that_changes_along_the_way_is_told_at_its_ends(tmp_path: Path) -> None:
