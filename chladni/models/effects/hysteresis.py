@@ -1,4 +1,4 @@
-"""Hysteresis: a force that remembers which way it came (Bouc-Wen), and one that forgets with time."""
+"""Hysteresis: a force that remembers which way it came (Bouc-Wen; Iwan), and one that forgets with time."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,6 +11,7 @@ from chladni.models.core.port_law import LawFunction, PortLaw
 from chladni.models.effects.attaching import LawAtPort
 from chladni.models.effects.clues import Clues, FittedForm
 from chladni.models.effects.effect_kind import EffectKind, Values, Variant
+from chladni.models.effects.stops import stops_along
 from chladni.models.effects.trial import Force, Numbers, Shape, Trial, TrialMotion, logarithms, numbers, positive, rms
 from chladni.models.integrator.known_motion import force_along_motion
 from chladni.signals.arrays import Complex, Real
@@ -48,6 +49,38 @@ def creeping(_d: float, s: float, _t: float, parameters: Any, state: Any, rates:
     return float(parameters[0] * w)
 
 
+#: Elements in parallel that stand for a continuous distribution of yields.
+_SLIDERS = 6
+
+
+def sliders(_d: float, s: float, _t: float, parameters: Any, state: Any, rates: Any) -> float:
+    """Give ``sum(stiffness_k yield_k w_k)``; parameters shape, yields, stiffnesses: of each an element of `bouc_wen`.
+
+    Springs with sliders in parallel yield one after another (W. D. Iwan, Journal of Applied Mechanics 33 (1966)
+    893-900): a joint slips at its rim long before it slips as a whole, and loops close on themselves (Masing).
+    """
+    force = 0.0
+    for place in range(_SLIDERS):
+        w, bend = state[place], parameters[1 + place]
+        size = min(abs(w), 2.0) ** parameters[0] if s * w > 0.0 else 0.0
+        rates[place] = s * (1.0 - size) / bend
+        force += parameters[1 + _SLIDERS + place] * bend * w
+    return float(force)
+
+
+def _slider_numbers(values: Values, _port: Port) -> tuple[float, ...]:
+    """Elements whose yields are the middles of equal parts of their range, with what stiffness yields in each part.
+
+    Of D. J. Segalman's joint (Journal of Applied Mechanics 72 (2005) 752-760) with density ``yield^chi`` the share
+    that yields before y goes as ``y^(1 + chi)``: one over that power is the spread.
+    """
+    power = 1.0 / values["spread"]
+    shares = np.diff(np.linspace(0.0, 1.0, _SLIDERS + 1) ** power)
+    middles = (np.arange(_SLIDERS) + 0.5) / _SLIDERS
+    yields = values["yield"] * middles / float(shares @ middles)
+    return values["shape"], *yields.tolist(), *(values["force"] / values["yield"] * shares).tolist()
+
+
 def _numbers(values: Values, _port: Port) -> tuple[float, ...]:
     return values["force"], values["yield"], values["shape"]
 
@@ -60,6 +93,8 @@ def _creeping_numbers(values: Values, _port: Port) -> tuple[float, ...]:
 _STEPS = 16
 #: Yields over the way's RMS below which there's no loop to be seen, without and with creep.
 _LEAST_YIELD, _LEAST_CREEPING = 0.05, 0.01
+#: Powers of the yields' spread that the sliders of a joint have, and how sharply each of them yields.
+_SPREADS, _SHARP = (0.1, 8.0), 2.0
 #: Of the usual way and pace of a joint: a yield below is friction's presliding.
 _FRICTION = 0.12
 
@@ -67,6 +102,7 @@ _FRICTION = 0.12
 def _trials(motion: TrialMotion) -> Iterator[Trial]:
     yield _plain_trial(motion)
     yield _creeping_trial(motion)
+    yield _slider_trial(motion)
 
 
 def _plain_trial(motion: TrialMotion) -> Trial:
@@ -106,6 +142,30 @@ def _creeping_trial(motion: TrialMotion) -> Trial:
     return Trial(
         variant="creeping", build=build,
         grid=logarithms((0.02 * reach, 0.06 * reach, 0.2 * reach), (0.1 * speed, 0.3 * speed)),
+        values=values, parameters=4,
+    )  # fmt: skip
+
+
+def _slider_trial(motion: TrialMotion) -> Trial:
+    """Sliders that yield at once when they do, whose force along a motion needs no steps."""
+    reach = rms(motion.displacement)
+
+    def build(shape: Shape) -> Force:
+        bend, spread = _bounded(shape)
+        unit = {"force": 1.0, "yield": bend, "shape": _SHARP, "spread": spread}
+        yields, stiffnesses = np.reshape(_slider_numbers(unit, motion.port)[1:], (2, _SLIDERS))
+        return Force.of(motion.spectrum(stops_along(motion.displacement, yields, stiffnesses)))
+
+    def values(shape: Shape, a: Real) -> Numbers | None:
+        bend, spread = _bounded(shape)
+        return positive(a, force=a[0], shape=_SHARP, spread=spread, **{"yield": bend})
+
+    def _bounded(shape: Shape) -> tuple[float, float]:
+        bend, spread = numbers(shape)
+        return max(bend, _LEAST_YIELD * reach), float(np.clip(spread, *_SPREADS))
+
+    return Trial(
+        variant="sliders", build=build, grid=logarithms((0.3 * reach, 0.7 * reach, 1.5 * reach), (1.0, 3.0)),
         values=values, parameters=4,
     )  # fmt: skip
 
@@ -184,6 +244,23 @@ HYSTERESIS = EffectKind(
             ),
             odd=True,
             fitted=("slip_speed", "loop"),
+        ),
+        Variant(
+            name="sliders",
+            attach=LawAtPort(law=sliders, numbers=_slider_numbers, state=(0.0,) * _SLIDERS),
+            formula="F = force/yield sum share_k yield_k w_k, yield_k ~ k - 1/2, "
+            "share_k = (k/6)^(1/spread) - ((k - 1)/6)^(1/spread), sum share_k yield_k = yield, "
+            "yield_k w_k' = s - (|s| w_k |w_k|^(shape-1) + s |w_k|^shape)/2",
+            parameters=Parameters(
+                (
+                    Parameter(
+                        name="spread", value=1.0, unit="1", low=0.1, high=8.0, minimum=0.1, maximum=20.0,
+                        meaning="of their yields: at 0.1 nearly all alike, at 1 even, above it most are small",
+                    ),
+                )
+            ),
+            odd=True,
+            fitted=("spread", "shape"),
         ),
     ),
 )  # fmt: skip

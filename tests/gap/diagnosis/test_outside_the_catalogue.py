@@ -18,7 +18,7 @@ COEFFICIENT = 70.0
 
 @dataclass(frozen=True)
 class Wheel:
-    """Pushes two bodies aside by each other's velocity, without doing work."""
+    """Pushes two bodies aside by each other's velocity, without doing work: as the catalogue's word does."""
 
     effect: str = "gyroscopic_coupling"
     site: str = "wrist"
@@ -36,8 +36,8 @@ class Wheel:
 
 
 @pytest.mark.nightly
-def test_a_wheel_that_spins_between_two_bodies_is_unknown() -> None:
-    found = diagnose(arm(), [measured((Wheel(),), seed=3)])
+def test_a_wheel_that_spins_between_two_bodies_is_unknown_where_its_word_is_left_out() -> None:
+    found = diagnose(arm(), [measured((Wheel(),), seed=3)], leave_out={"gyroscopic"})
     assert found.verdict == "unknown"
 
 

@@ -49,7 +49,7 @@ def two_sensors(*effects: AttachedEffect, words: frozenset[str]):
         StructureOutput(name="a1", measures="acceleration", at="b1"),
     )
     machine = replace(chain([2.0, 1.5], [5e4, 6e4], [12.0, 9.0]), outputs=seen)
-    log, _ = made_log.measured(machine.with_effects(effects), band_noise(3000, rms=60.0), noise=5e-3)
+    log, _ = made_log.measured(machine.with_effects(effects), band_noise(3000, rms=60.0), noise=2e-3)
     return study_of(machine, log, leave_out=frozenset(CATALOGUE) - words, own={})
 
 

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from chladni.models.effects.attached_effect import attached
+from chladni.models.effects.stops import stops_along
 from tests.models.effects.motions import driven, energy, law_of, loop
 from tests.models.effects.small_models import one_body
 
@@ -102,3 +103,47 @@ def test_the_loop_of_a_creeping_element_is_dahls_at_one() -> None:
 @pytest.mark.parametrize("speed", [0.05, 1.0, 20.0])
 def test_a_creeping_element_takes_energy_at_any_speed(speed: float) -> None:
     assert energy(*loop(_creeping(loop=4.0), 2 * YIELD, speed * SLIP / (2 * YIELD))) > 0.0
+
+
+def _sliders(**values: float):  # type: ignore[no-untyped-def]
+    given = {"force": FORCE, "yield": YIELD, "shape": 40.0, **values}
+    return law_of(attached("hysteresis", "spring", given, variant="sliders"), one_body())
+
+
+def test_sliders_slip_one_after_another_along_iwans_backbone() -> None:
+    # Of an even spread up to 2 yield the springs that are left carry k (d - d^2/(4 yield)).
+    times_s = np.linspace(0, 1, 41)
+    d = 2 * YIELD * times_s
+    found = driven(_sliders(), lambda t: 2 * YIELD * t, lambda _t: 2 * YIELD, times_s)
+    # Six in place of a continuum.
+    np.testing.assert_allclose(found, FORCE / YIELD * (d - d**2 / (4 * YIELD)), atol=0.02 * FORCE)
+
+
+@pytest.mark.parametrize("spread", [0.1, 1.0, 5.0])
+def test_sliders_are_as_stiff_at_first_as_force_over_yield_and_hold_the_force(spread: float) -> None:
+    d, f = loop(_sliders(spread=spread), 1e-4 * YIELD, 5.0)
+    np.testing.assert_allclose(f, FORCE / YIELD * d, atol=1e-5 * FORCE / YIELD * 1e-4 * YIELD)
+    times_s = np.linspace(0, 1, 21)
+    found = driven(_sliders(spread=spread), lambda t: 40 * YIELD * t, lambda _t: 40 * YIELD, times_s)
+    assert found[-1] == pytest.approx(FORCE, rel=1e-6)
+
+
+def test_loops_of_sliders_are_the_backbone_twice_as_large() -> None:
+    # Masing's rule: from a turn at d0 the force goes back by twice what it took from rest to half the way.
+    amplitude, times_s = 1.5 * YIELD, np.linspace(0, 2, 81)
+    found = driven(
+        _sliders(), lambda t: amplitude * (1 - abs(t - 1)), lambda t: amplitude * (1.0 if t < 1 else -1.0), times_s
+    )
+    there, back = found[:41], found[40:]
+    np.testing.assert_allclose(back[0] - back[::2], 2 * there[:21], atol=0.01 * FORCE)
+
+
+def test_along_a_known_motion_sliders_are_springs_that_are_cut_off() -> None:
+    d = 3 * YIELD * np.sin(np.linspace(0, 20, 4001)) * np.linspace(0, 1, 4001)
+    law = _sliders()
+    yields, stiffnesses = np.reshape(law.parameters[1:], (2, -1))
+    found = driven(
+        law, lambda t: np.interp(t, np.arange(4001), d), lambda t: np.interp(t, np.arange(4001), np.gradient(d)),
+        np.arange(4001.0),
+    )  # fmt: skip
+    np.testing.assert_allclose(stops_along(d, yields, stiffnesses), found, atol=0.03 * FORCE)

@@ -140,6 +140,12 @@ JOINT_LAWS = [
         ),
         SWITCHING,
     ),
+    (
+        attached(
+            "hysteresis", "spring", {"force": 8.0, "yield": 0.005, "shape": 2.0, "spread": 2.0}, variant="sliders"
+        ),
+        SWITCHING,
+    ),
     (attached("varying_stiffness", "spring", {"relative_change": 0.6, "time": 0.2}), SMOOTH),
     (attached("varying_stiffness", "spring", CHANGE, variant="step"), SMOOTH),
     (attached("ripple", "spring", {"amplitude": 6.0, "period": 0.02}), SMOOTH),
