@@ -159,7 +159,9 @@ def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed:
     weight = problem.weight
     linear = tuple(one for one in fit.effects if one.kind.linear)
     view, plain = (problem.beside(fit.z, run.compiled(fit.z, effects)) for effects in (linear, ()))
-    residual = lines.spectrum(measurement.outputs - fit.outputs) * weight
+    missed = measurement.outputs - fit.outputs
+    missed[:, : run.unknown_at_start(fit.z, fit.effects)] = 0.0
+    residual = lines.spectrum(missed) * weight
     missing = np.asarray((problem.measured - plain.forced()) * weight, dtype=np.complex128)
     (along, across), out = _split(view, measurement.output_names, detailed, weight, residual)
     (force, _), _ = _split(plain, measurement.output_names, detailed, weight, missing)

@@ -131,6 +131,13 @@ class FreeRun:
         read = self._run(in_time, ("in time", _key(z, effects)), initial)
         return mapped_outputs(compiled, self.rows, read_late(read, late_s, rate), rate)
 
+    def unknown_at_start(self, z: Real | None = None, effects: Sequence[AttachedEffect] = ()) -> int:
+        """Samples at the start that dead times of inputs fill from before the record: nobody knows with what."""
+        if self.is_black_box:
+            return 0
+        dead_s = max(self.compiled(z, effects).input_delays_s, default=0.0)
+        return min(int(np.ceil(dead_s * self.measurement.sample_rate_hz)), self.measurement.samples)
+
     def late_s(self, compiled: CompiledModel) -> Real:
         """``[output]`` how late the clocks of the measured outputs are."""
         return np.asarray(compiled.output_offsets_s, dtype=np.float64)[self.rows]

@@ -153,15 +153,17 @@ def fit_output_error(
     require_shape("training", training, (samples,), "the log")
     z = np.zeros(count) if start_z is None else np.asarray(start_z, dtype=np.float64)
     require_shape("start_z", z, (count,), "the tunable parameters")
+    known = _known(run, noise, z, effects)
+    seen = training & known
     problem = FitProblem(
-        run, _whitening(run, noise, training, offsets), training,
+        run, _whitening(run, noise, seen, offsets), seen,
         effects=effects, numbers=effect_numbers(effects, fitted), tune=tune, freed=freed, held=held, start_z=z,
     )  # fmt: skip
     start = problem.start_of_windows() if problem.has_laws and len(run.windows) > 1 else problem.start()
     if start_initial is not None:
         start = Point(start.x, np.array(start_initial, dtype=np.float64).reshape(start.initial.shape))
     here, slopes, converged, iterations = _fit(problem, start, max_iterations, precision)
-    return _report(problem, here, slopes, converged=converged, iterations=iterations)
+    return _report(problem, here, slopes, held=known & ~training, converged=converged, iterations=iterations)
 
 
 def with_coloured_spread(
@@ -192,7 +194,8 @@ def with_coloured_spread(
     EstimateError
         When motions there part so fast that they have no slopes.
     """
-    seen = np.ones(run.measurement.samples, dtype=bool) if training is None else training
+    known = _known(run, noise, fit.z, fit.effects)
+    seen = known if training is None else training & known
     problem = FitProblem(
         run, _whitening(run, noise, seen, offsets), seen,
         effects=fit.effects, numbers=effect_numbers(fit.effects, fitted), tune=tune, freed=freed, held=False,
@@ -205,6 +208,13 @@ def with_coloured_spread(
     white = _inverse(slopes.curvature)
     covariance = white @ coloured_information(problem, here, slopes) @ white
     return replace(fit, covariance=covariance, **_spreads(problem, x, covariance))
+
+
+def _known(run: FreeRun, noise: NoiseFloor, z: Real, effects: Sequence[AttachedEffect]) -> Mask:
+    """``[sample]``: where no input comes from before the record, nor is anything whitened beside such a sample."""
+    unknown = run.unknown_at_start(z, effects)
+    first = unknown + noise.whitening.shape[1] - 1 if unknown else 0
+    return np.arange(run.measurement.samples) >= first
 
 
 def _whitening(run: FreeRun, noise: NoiseFloor, training: Mask, offsets: bool) -> Whitening:
@@ -289,14 +299,13 @@ def _expected(slopes: Slopes, step: Real) -> float:
 
 
 def _report(
-    problem: FitProblem, here: Evaluation, slopes: Slopes, *, converged: bool, iterations: int
+    problem: FitProblem, here: Evaluation, slopes: Slopes, *, held: Mask, converged: bool, iterations: int
 ) -> OutputErrorFit:
     x, run = here.point.x, problem.run
     z = problem.z(x)
     covariance = _inverse(slopes.curvature)
     offsets = here.residual.offsets
     outputs = here.outputs + offsets[:, None]
-    held = ~problem.training
     white = problem.whitening.whitened(run.measurement.outputs - outputs)[:, held]
     by_output = np.mean(white**2, axis=1) if held.any() else np.zeros(0)
     return OutputErrorFit(

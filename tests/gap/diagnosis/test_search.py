@@ -138,3 +138,17 @@ def test_a_hold_is_told_behind_a_cause_that_hid_it() -> None:
     assert [(one.effect, one.site) for one in search.best.fit.effects] == [("delay", "hammer")]
     assert search.best.fit.effects[0].values["delay"] == pytest.approx(3.0 / RATE_HZ, abs=0.1 / RATE_HZ)
     assert search.study.model.compile().holds == ("zoh",)
+
+
+def test_a_delay_is_named_in_a_log_that_begins_in_motion() -> None:
+    # The force of the first samples lies before the record, and an accelerometer beside it feels it at once.
+    late = attached("delay", "shaker", {"delay": 0.003})
+    log = measured((late,), seconds=5.0, noise=0.003)
+    cut = replace(log, inputs=log.inputs[:, 1000:], outputs=log.outputs[:, 1000:])
+    study = study_of(arm(), cut, leave_out=frozenset(CATALOGUE) - {"delay", "lag"}, own={})
+    search = Search(study)
+    search.run(lambda _: None)
+    assert [(one.effect, one.site) for one in search.best.fit.effects] == [("delay", "shaker")]
+    assert search.best.fit.effects[0].values["delay"] == pytest.approx(0.003, rel=1e-3)
+    assert search.belief.probability(*search.best.hypothesis.named) > 0.9
+    assert study.contest.run.unknown_at_start(search.best.fit.z, search.best.fit.effects) in (3, 4)
