@@ -1,7 +1,8 @@
 """What the measured logs of robots ask for, beside what is known of the machines: a row for each demand.
 
 The Go2's reference is a fit by PACE, whose simulation runs the drives' loop once a step of 5 ms. `--reference` fits
-the log by such a simulation, at that step and at a fifth of it: the step itself makes an armature.
+the log by such a simulation, at that step and at a fifth of it: the step itself makes an armature. What was found is
+fitted so, too.
 """
 
 import argparse
@@ -19,6 +20,8 @@ import numpy as np
 
 import chladni
 from chladni.gap.records.diagnosis import Diagnosis
+from chladni.gap.robots.forward import simulated
+from chladni.gap.robots.torques import torques_of
 from chladni.signals.arrays import Real
 
 LOGS = {
@@ -128,8 +131,23 @@ def make_iiwa(description: Path, path: Path) -> None:
 ROWS = {MADE: iiwa, "tx40": tx40, "go2": go2, "so101_elbow": so101, "so101_multisine": so101, "so101_friction": so101}
 
 
-def reference(folder: Path, splits: int) -> tuple[Real, float]:
+def found_machine(folder: Path) -> Real:
+    """``[joint, sample]``: what the machine that was found makes of the Go2's commands, delay and all."""
+    description, log = (folder / one for one in (LOGS["go2"][0], f"{LOGS['go2'][1]}.mcap"))
+    machine = chladni.diagnose_gap(description, log).machine
+    robot = chladni.load_robot(description)
+    with chladni.open(log) as opened:
+        torques = torques_of(robot, chladni.joint_log(robot, opened))
+    return simulated(machine, torques, [(0, torques.log.position.shape[1])])
+
+
+def reference(folder: Path, splits: int, position: Real | None = None) -> tuple[Real, float]:
     """Fit armature, damping, dry friction and a constant of each joint by simulations without a delay.
+
+    Parameters
+    ----------
+    position
+        ``[joint, sample]``: what is fitted; the log's own when None.
 
     Returns
     -------
@@ -144,7 +162,7 @@ def reference(folder: Path, splits: int) -> tuple[Real, float]:
     model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_EULER, STEP_S / splits
     model.opt.disableflags = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION | mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
     at, place = [one.dof for one in robot.joints], [one.position for one in robot.joints]
-    measured, command = joints.position, joints.command
+    measured, command = joints.position if position is None else position, joints.command
     assert command is not None
     length = 400
     starts = range(10, measured.shape[1] - length, length)
@@ -200,12 +218,15 @@ def main() -> None:
     parser.add_argument("--reference", action="store_true", help="armatures of the Go2 as PACE's simulation has them")
     options = parser.parse_args()
     if options.reference:
-        for splits in (1, 5):
-            armature, error = reference(options.folder, splits)
-            told = " ".join(f"{one:.4f}" for one in armature[:, 2])
-            print(
-                f"step {1e3 * STEP_S / splits:g} ms: calves {told} kg m^2, error {1e3 * error:.2f} mrad", flush=True
-            )
+        found = found_machine(options.folder)
+        for what, splits, position in (
+            ("the log", 1, None),
+            ("the log", 5, None),
+            ("the machine that was found", 1, found),
+        ):
+            armature, error = reference(options.folder, splits, position)
+            told, step_ms = " ".join(f"{one:.4f}" for one in armature[:, 2]), 1e3 * STEP_S / splits
+            print(f"{what}, step {step_ms:g} ms: calves {told} kg m^2, error {1e3 * error:.2f} mrad", flush=True)
         return
     print("| log | what | asked or known | seen |\n| --- | --- | --- | --- |")
     for name in options.logs or LOGS:
