@@ -16,8 +16,8 @@ from chladni.gap.robots.promise import Promises
 from chladni.gap.robots.row import Moments, Row, columns_of_rows, parts_of
 from chladni.gap.robots.set_prior import SetPrior
 from chladni.gap.robots.term import FOUND, Term
-from chladni.gap.robots.tolerances import tolerances
-from chladni.gap.robots.torques import RIGHT, Torques
+from chladni.gap.robots.tolerances import LOOP_S, tolerances
+from chladni.gap.robots.torques import ALL_COMMANDS, RIGHT, Torques
 from chladni.gap.robots.words import all_terms
 from chladni.signals.arrays import Index, Mask, Real
 
@@ -164,6 +164,25 @@ class Contest:
         values, covariance = self._within(fit)
         deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return dict(zip(self._tolerated, zip(values.tolist(), deviations.tolist(), strict=True), strict=True))
+
+    def delay_of_all(self, fit: Fit) -> tuple[float, float]:
+        """Give how late the commands of all joints come, and its standard deviation, s.
+
+        They wait for the loop's turn. Where efforts would be the same for other delays, the motion tells which it is.
+        """
+        within, torques = self.tolerances(fit), self.torques
+        number, spread = torques.robot.delay_s, 0.0
+        for place, term in enumerate(fit.terms):
+            if term.key == ("delay", ALL_COMMANDS):
+                values, deviations = fit.values(place)
+                number, spread = float(values[0]), float(deviations[0])
+        (turn, _), (later, doubt) = (within.get(name, (0.0, 1.0)) for name in ("turn", "later"))
+        middle = torques.guesses.late_s.get(ALL_COMMANDS)
+        if middle is None or torques.doubt_s == 0.0:
+            return number + LOOP_S * turn, spread
+        return torques.robot.delay_s + middle + torques.doubt_s * later, float(
+            np.hypot(spread, torques.doubt_s * doubt)
+        )
 
     def together(self, fit: Fit, weights: Sequence[Mapping[str, float]]) -> tuple[Real, Real]:
         """Give what a fit says of weighted sums of numbers in their tolerances: values, and covariance."""

@@ -61,7 +61,7 @@ class Solved:
         term = self.best.terms[place]
         values, deviations = self.best.values(place)
         if (term.word, term.site) == ("delay", ALL_COMMANDS):
-            found = {"delay": (float(values[0]) + _turn_s(self.contest, self.best), float(deviations[0]), "s")}
+            found = {"delay": (*self.contest.delay_of_all(self.best), "s")}
         elif term.word in TOLD:
             found = TOLD[term.word](term, values, deviations)
         else:
@@ -201,7 +201,8 @@ def _guesses(contest: Contest, fit: Fit, forms: Forms) -> Guesses:
         if term.word == "delay":
             late[term.site] = float(values[0])
             if term.site == ALL_COMMANDS:
-                late[term.site] += _turn_s(contest, fit) - torques.robot.delay_s
+                whole = late[term.site] + _turn_s(contest, fit) - torques.robot.delay_s
+                late[term.site] = float(np.mean(torques.same_commands(whole)))
         elif term.word == "payload" and values[0] > _placed_from(torques, term.site) * deviations[0]:
             centres[term.site] = np.asarray(values[1:4] / values[0])
         elif term.word == "encoder_offset" and term.variant == OF_THE_LOG:

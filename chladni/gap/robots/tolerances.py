@@ -59,6 +59,9 @@ def tolerances(torques: Torques) -> tuple[Real, list[str]]:
             found.append((f"{name}.hold", at_row(torques, row, stiffness * between[row])[0]))
             if torques.two_sided:
                 found.append((f"{name}.within", at_row(torques, row, torques.within[row])[0]))
+        if torques.two_sided:
+            # Between efforts commands may come any time that leaves the efforts as they are.
+            found.append(("later", torques.doubt_s * torques.later))
     columns = np.zeros((len(found), *torques.missing.shape))
     for place, (_, column) in enumerate(found):
         columns[place, : len(column)] = column

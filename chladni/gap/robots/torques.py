@@ -468,10 +468,40 @@ class Torques(Motion):
         vars(other)["missing"] = missing
         return other
 
+    def same_commands(self, late_s: float) -> tuple[float, float]:
+        """Give the shortest and the longest delay that hold the same commands as one when efforts are sampled.
+
+        Commands in step with the samples tell a delay no closer. The delay itself, twice, where a motion answers.
+        """
+        starts = next((starts for _, (starts, _) in self._messages() if starts.size), None)
+        if not self.two_sided or starts is None:
+            return late_s, late_s
+        at = self.log.time_s - self.robot.delay_s - late_s + _TIE_S
+        newest = np.searchsorted(starts, at, "right") - 1
+        inside = (newest >= 0) & (newest + 1 < starts.size)
+        if not np.any(inside):
+            return late_s, late_s
+        at, newest = at[inside], newest[inside]
+        return late_s - float(np.min(starts[newest + 1] - at)), late_s + float(np.min(at - starts[newest]))
+
+    @cached_property
+    def doubt_s(self) -> float:
+        """Standard deviation of a delay of all between those that hold the same commands: a uniform distribution."""
+        shortest, longest = self.same_commands(self.guesses.late_s.get(ALL_COMMANDS, 0.0))
+        return float((longest - shortest) / np.sqrt(12.0))
+
+    @cached_property
+    def later(self) -> Real:
+        """``[joint, coarse]``: mean torque a second by which held commands come later than efforts tell."""
+        late_s, half = self.guesses.late_s.get(ALL_COMMANDS, 0.0), 0.5 / self.log.sample_rate_hz
+        change = self.mean_command(late_s - half, half) - self.mean_command(late_s + half, half)
+        return self.smooth(np.nan_to_num(self.by_row("kp")[:, None] * change)) / (2.0 * half)
+
     def late(self, from_s: float, by_s: float) -> Real:
         """``[joint, coarse]``: missing torque a second, of commands that come so much later than some delay."""
-        step = 1.0 / self.log.sample_rate_hz
-        first, last = (from_s, from_s + by_s) if abs(by_s) > step else (from_s - 0.5 * step, from_s + 0.5 * step)
+        half = 0.5 / self.log.sample_rate_hz
+        # Efforts change by whole commands: a slope is that over a sample.
+        first, last = (from_s, from_s + by_s) if by_s else (from_s - half, from_s + half)
         # Where nobody commands a joint nothing comes late.
         earlier = np.nan_to_num(self.command(first) - self.command(last))
         return self.kp[:, None] * self.smooth(earlier) / (last - first)

@@ -15,7 +15,7 @@ from chladni.gap.robots.solved import Solved, solved
 from chladni.gap.robots.torques import ALL_COMMANDS, torques_of
 from chladni.robots.machine import Machine, Transmission, as_described
 from chladni.robots.robot import Robot
-from tests.robots.machines import RATE_HZ, arm, changed, commands, course, joint_log_of
+from tests.robots.machines import RATE_HZ, arm, changed, commands, course, joint_log_of, run_native
 
 pytest.importorskip("mujoco")
 
@@ -118,6 +118,28 @@ def test_about_a_delay_that_was_found_only_its_slope_is_left(tmp_path: Path) -> 
     assert found.best.values(0)[0][0] == pytest.approx(7 / RATE_HZ, abs=5e-4)
     # Waiting for the loop's turn takes no part of it.
     assert abs(found.contest.tolerances(found.best)["turn"][0]) < 0.5
+
+
+@pytest.mark.parametrize("samples", [1.25, 1.75])
+def test_of_delays_that_leave_efforts_as_they_are_the_motion_tells_which(tmp_path: Path, samples: float) -> None:
+    command, late_s = commands(6.0), samples / RATE_HZ
+    position = run_native(arm(tmp_path, "machine/arm.xml", servo=f' delay="{late_s}" nsample="40"'), command)
+    held = np.concatenate([command[:, :1], command[:, :1], command[:, :-2]], axis=1)
+    effort = np.array([[120.0], [60.0]]) * (held - position)
+    effort -= np.array([[8.0], [3.0]]) * np.gradient(position, 1.0 / RATE_HZ, axis=1)
+    robot = arm(tmp_path)
+    alone = torques_of(robot, joint_log_of(robot, position, command=command))
+    assert alone.same_commands(late_s) == (late_s, late_s)
+    beside = torques_of(robot, joint_log_of(robot, position, command=command, effort=effort))
+    # Any delay between one and two samples takes the same command.
+    assert beside.same_commands(late_s) == pytest.approx((1.0 / RATE_HZ, 2.0 / RATE_HZ), abs=1e-6)
+    found = solved(beside, frozenset(), lambda _: None)
+    place = next(at for at, term in enumerate(found.best.terms) if term.word == "delay")
+    value, deviation, _ = found.numbers(place)["delay"]
+    # A sample's interval has a deviation of more.
+    assert deviation < 1.0 / RATE_HZ / np.sqrt(12.0)
+    assert value == pytest.approx(late_s, abs=deviation)
+    assert (value > 1.5 / RATE_HZ) == (samples > 1.5)
 
 
 @given(seed=st.integers(0, 2**32 - 1), acting=st.lists(st.booleans(), min_size=2, max_size=8))
