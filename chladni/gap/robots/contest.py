@@ -171,18 +171,15 @@ class Contest:
         They wait for the loop's turn. Where efforts would be the same for other delays, the motion tells which it is.
         """
         within, torques = self.tolerances(fit), self.torques
-        number, spread = torques.robot.delay_s, 0.0
-        for place, term in enumerate(fit.terms):
-            if term.key == ("delay", ALL_COMMANDS):
-                values, deviations = fit.values(place)
-                number, spread = float(values[0]), float(deviations[0])
         (turn, _), (later, doubt) = (within.get(name, (0.0, 1.0)) for name in ("turn", "later"))
-        middle = torques.guesses.late_s.get(ALL_COMMANDS)
-        if middle is None or torques.doubt_s == 0.0:
-            return number + LOOP_S * turn, spread
-        return torques.robot.delay_s + middle + torques.doubt_s * later, float(
-            np.hypot(spread, torques.doubt_s * doubt)
-        )
+        place = next((at for at, term in enumerate(fit.terms) if term.key == ("delay", ALL_COMMANDS)), None)
+        if place is None:
+            return torques.robot.delay_s + LOOP_S * turn, 0.0
+        values, deviations = fit.values(place)
+        middle, width = torques.guesses.late_s.get(ALL_COMMANDS), torques.doubt_s
+        if middle is None or width == 0.0:
+            return float(values[0]) + LOOP_S * turn, float(deviations[0])
+        return torques.robot.delay_s + middle + width * later, float(np.hypot(deviations[0], width * doubt))
 
     def together(self, fit: Fit, weights: Sequence[Mapping[str, float]]) -> tuple[Real, Real]:
         """Give what a fit says of weighted sums of numbers in their tolerances: values, and covariance."""
