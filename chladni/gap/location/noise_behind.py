@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 from scipy.optimize import nnls
 
-from chladni.gap.calibration import FAINT_WISH, FLOOR_BANDS, HARDLY_ANY, SAME
+from chladni.gap.calibration import FAINT_WISH, FLOOR_BANDS, HARDLY_ANY, LESS, SAME
 from chladni.gap.comparison.autoregressive import noise_floor_of
 from chladni.gap.location.profile import Profile, Projection
 from chladni.gap.plant.linear_problem import LinearProblem
@@ -39,11 +39,12 @@ def noise_behind(problem: LinearProblem, found: Profile) -> NoiseFloor:
         found_power = nnls(
             np.vstack([matrix, wish]), np.concatenate([left[:, low:high].mean(axis=1), np.diag(wish)])
         )[0]
-        factor[:, low:high] = np.clip(found_power, HARDLY_ANY**2, 1.0)[:, None]
-    former_density = problem.noise.density(whole.lines.cycles)
-    # What no model follows a machine to is in the weight beside the noise.
-    density = np.maximum(factor / whole.weight[:, 0] ** 2 - whole.error, HARDLY_ANY**2 * former_density)
+        # Few sensors hardly tell whose a residual is: one's a little lower and another's higher would lower both.
+        lower = np.where(found_power < LESS, np.maximum(found_power, HARDLY_ANY**2), 1.0)
+        factor[:, low:high] = lower[:, None]
     former = problem.noise
+    # What no model follows a machine to is in the weight beside the noise, and may be in what is left: no one knows.
+    density = np.minimum(factor / whole.weight[:, 0] ** 2, former.density(whole.lines.cycles))
     return noise_floor_of(
         np.pad(density, ((0, 0), (1, 1 - measurement.samples % 2)), mode="edge"),
         samples=measurement.samples,
