@@ -148,8 +148,11 @@ class ChangeWatch:
         if not moving:
             return ()
         base = self._baseline.select(moving)
-        widened = replace(density.select(moving), std=density.select(moving).values * (base.std / base.values))
-        found = compare_densities(base, _positive(widened, density.select(moving)), false_discovery=FALSE_DISCOVERY)
+        own = density.select(moving)
+        # A line that nothing ever showed on has no relative scatter.
+        scatter = np.divide(base.std, base.values, out=np.zeros_like(base.std), where=base.values > 0)
+        widened = replace(own, std=own.values * scatter)
+        found = compare_densities(base, _positive(widened, own), false_discovery=FALSE_DISCOVERY)
         all_of_them: tuple[PeakChange | LevelChange, ...] = (*found.peaks, *found.overall)
         changes = {_key(one): one for one in all_of_them if _counts(one)}
         again = self._before & set(changes)

@@ -84,7 +84,7 @@ def _sentences(found: Diagnosis) -> Iterator[str]:
     # Where nothing was named, or added to the model, nothing closes.
     if found.verdict in ("effect", "parameters"):
         if found.verdict == "parameters" or found.gap.after != found.gap.tuned:
-            yield from _closed(found.gap)
+            yield from _closed(found)
         yield from _elsewhere(found)
     yield from _how(found)
     if found.advice:
@@ -275,12 +275,14 @@ def _unknown(found: Diagnosis) -> Iterator[str]:
         yield f"Nearest, but not good enough: {', '.join(nearest)}."
 
 
-def _closed(gap: Closing) -> Iterator[str]:
+def _closed(found: Diagnosis) -> Iterator[str]:
     """How sure the share that closes is, or that nothing can be said of it."""
+    gap = found.gap
     yield from _too_near(gap)
     if gap.closed is not None and gap.interval is not None:
         low, high = (percent(end).removesuffix(" %") for end in gap.interval)
-        yield f"Adding it closes {percent(gap.closed)} of the gap above the noise (95 % interval {low} to {high} %)."
+        adding = "Adding it" if len(found.causes) == 1 else "Adding them"
+        yield f"{adding} closes {percent(gap.closed)} of the gap above the noise (95 % interval {low} to {high} %)."
 
 
 def _too_near(gap: Closing) -> Iterator[str]:

@@ -67,3 +67,10 @@ def test_a_setpoint_that_rests_for_seconds_is_no_dead_sensor() -> None:
     steps = np.repeat(np.random.default_rng(2).standard_normal(SECONDS // 3), int(3 * RATE_HZ))
     values = np.stack([steps, noise(1, steps.size)[0]])
     assert [change for change in watched(series(values, rate_hz=RATE_HZ)) if change.kind == "sensor"] == []
+
+
+@pytest.mark.filterwarnings("error")
+def test_lines_on_which_nothing_ever_showed_tell_nothing() -> None:
+    # Two values in turn: at rest between its lines, to the last bit.
+    values = np.tile([1.0, -1.0], (2, moments().size // 2))
+    assert watched(series(values, rate_hz=RATE_HZ)) == []

@@ -112,6 +112,7 @@ def test_no_share_is_told_where_none_is_known() -> None:
     )
     said = summary(untold)
     assert said[1].startswith("Adding them brings the error from 28 % to 1.0 %")
+    assert any(one.startswith("Adding them closes 99.5 %") for one in said)
     assert not any("comes back" in one for one in said)
 
 

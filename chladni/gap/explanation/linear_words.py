@@ -216,10 +216,11 @@ class _Scores:
         if not kind.required or not set(kind.required) <= set(kind.neutral):
             return []
         compiled = self._plain.compiled
+        if kind.clues.between_linked:
+            # No force between two bodies tells of what also acts beside their joint.
+            return pairs_of(compiled, "pair")
         sites = sites_of(compiled, self.problem.measurement.output_names)
-        there = [site.name for site in sites if site.kind in kind.sites and site.name not in taken]
-        # No force between two bodies tells of what also acts beside their joint.
-        return pairs_of(compiled, "pair") if kind.clues.between_linked else there
+        return [site.name for site in sites if site.kind in kind.sites and site.name not in taken]
 
     def weighed(self, kind: EffectKind, site: str) -> tuple[LinearFit, float] | None:
         """Give the effect of the size that its first step promises, with its cost; None where it promises nothing."""
