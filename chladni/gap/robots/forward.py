@@ -10,7 +10,7 @@ from chladni.gap.robots.fit import Fit
 from chladni.gap.robots.joint_words import ALONG_THE_WAY, way_of
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.tolerances import INERTIAL_NAMES, LOOP_S, tolerated_inertia
-from chladni.gap.robots.torques import Torques
+from chladni.gap.robots.torques import ALL_COMMANDS, Torques
 from chladni.gap.robots.transmission_words import AT_MOTOR, LEAST_ROTOR
 from chladni.robots.dynamics import inertial_numbers
 from chladni.robots.floating_base import BaseMotion
@@ -87,7 +87,9 @@ class _Reading:
 
     def _set_delays(self) -> None:
         late = {term.site: float(values[0]) for term, values in self._terms if term.word == "delay"}
-        common = self._contest.delay_of_all(self._fit)[0]
+        common = self._robot.delay_s + LOOP_S * self._within.get("turn", 0.0)
+        if ALL_COMMANDS in late:
+            common = self._contest.delay_of_all(self._fit)[0]
         for name in self._torques.log.joints:
             delay_s = max(common + late.get(name, 0.0), 0.0)
             self._joints[name] = replace(self._joints[name], delay_s=delay_s)

@@ -9,6 +9,7 @@ import pytest
 from chladni.gap.robots.contest import Contest
 from chladni.gap.robots.forward import machine_of, simulated
 from chladni.gap.robots.solved import Solved, solved
+from chladni.gap.robots.tolerances import LOOP_S
 from chladni.gap.robots.torques import Torques, torques_of
 from chladni.gap.robots.trial import Confirmed, Trial
 from chladni.robots.machine import Coupling, as_described
@@ -109,6 +110,13 @@ def test_a_delay_of_all_commands_and_weak_gains(tmp_path: Path) -> None:
     closing = trial(found)
     assert closing is not None
     assert closing.after < 0.1 * closing.before
+
+
+def test_without_a_delay_commands_wait_no_longer_than_a_loop_may(tmp_path: Path) -> None:
+    contest = Contest(torques(tmp_path, servo=f' delay="{DELAY_S}" nsample="40"'))
+    assert contest.tolerances(contest.nothing)["turn"][0] > 4.0
+    machine = machine_of(contest, contest.nothing)
+    assert all(0.0 < one.delay_s <= 3.0 * LOOP_S for one in machine.joints)
 
 
 def test_tolerated_masses_are_set_in_the_sense_in_which_they_help(tmp_path: Path) -> None:
