@@ -25,6 +25,10 @@ _Fmax = Annotated[
     float | None,
     typer.Option("--fmax", metavar="HZ", help="Only modes below this frequency.", show_default=False),
 ]
+_Uff = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.uff", help="Write shapes, points and functions as UFF.", show_default=False),
+]
 MethodName = Literal["plscf", "circle-fit", "half-power", "ssi-cov", "fdd", "efdd"]
 
 
@@ -62,10 +66,7 @@ def modes(
     unit: options.Unit = None,
     looks: options.Looks,
     targets: options.Targets,
-    uff: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.uff", help="Write shapes, points and functions as UFF.", show_default=False),
-    ] = None,
+    uff: _Uff = None,
     save: Annotated[
         Path | None, typer.Option(metavar="OUT.rrd", help="Write a rerun recording.", show_default=False)
     ] = None,

@@ -137,10 +137,10 @@ class Catalog:
         if parsed.topic not in self.topics:
             raise LogError(f"{path!r}: messages of {parsed.topic} can't be decoded: {self.refused[parsed.topic]}")
         if not parsed.steps:
-            of_topic = [one for one in self.channels if one.topic == parsed.topic]
-            if len(of_topic) == 1:
-                return of_topic[0]
-            names = [one.channel.name for one in of_topic]
+            names = [one.channel.name for one in self.channels if one.topic == parsed.topic]
+            if len(names) == 1:
+                # As the topic knows it: what a setup file says of it must not be applied twice.
+                return self._resolved(names[0])
             raise LogError(f"{path!r} is a topic; name a channel of it; {near_matches(path, names)}")
         source = self.topics[parsed.topic].resolve(parsed)
         self._require_one_publisher(parsed, source)

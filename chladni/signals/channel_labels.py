@@ -79,16 +79,20 @@ def topic_of(name: str) -> str:
     >>> topic_of("/motor/force.value"), topic_of("tip")
     ('/motor/force', 'tip')
     """
-    pieces = _PIECE.findall(name)
-    last_slash = max((place for place, piece in enumerate(pieces) if piece == "/"), default=-1)
+    pieces, last_slash = _pieces(name)
     first_dot = next((place for place in range(last_slash + 1, len(pieces)) if pieces[place] == "."), len(pieces))
     return "".join(pieces[:first_dot])
 
 
+def _pieces(name: str) -> tuple[list[str], int]:
+    """Words and separators of a name, and the place of the last slash; -1 where there is none."""
+    pieces = _PIECE.findall(name)
+    return pieces, max((place for place, piece in enumerate(pieces) if piece == "/"), default=-1)
+
+
 def _split(name: str) -> tuple[Sequence[str], Sequence[str]]:
     """Parts of the topic and fields after it; separators inside brackets, braces and quotes don't count."""
-    pieces = _PIECE.findall(name)
-    last_slash = max((place for place, piece in enumerate(pieces) if piece == "/"), default=-1)
+    pieces, last_slash = _pieces(name)
     after = [piece for piece in pieces[last_slash + 1 :] if piece != "."]
     before = [piece for piece in pieces[: max(last_slash, 0)] if piece not in "/."]
     return [*before, *after[:1]], after[1:]

@@ -170,12 +170,16 @@ def test_paths_that_name_nothing(imu_log: tuple[Log, Real], path: str, told: str
 
 
 def test_a_topic_of_one_channel_is_that_channel(tmp_path: Path) -> None:
-    made = TimeSeries.from_arrays({"force": [1.0, 2.0, 3.0], "tip": [4.0, 5.0, 6.0]}, sample_rate_hz=10.0, units="N")
+    made = TimeSeries.from_arrays({"force": [1.0, 2.0, 3.0], "tip": [4.0, 5.0, 6.0]}, sample_rate_hz=10.0)
     write_mcap([made], tmp_path / "named.mcap")
     log = open_log(tmp_path / "named.mcap")
     assert [one.name for one in log.channels] == ["/force.value", "/tip.value"]
+    setup = tmp_path / "setup.toml"
+    setup.write_text('format = "chladni.setup/1"\n[[channel]]\npath = "/force.value"\nunit = "kN"\n')
+    told = open_log(tmp_path / "named.mcap", setup=setup)
     for word in ("force", "/force", "/force.value"):
         assert log.read(word).values.tolist() == [[1.0, 2.0, 3.0]]
+        assert told.read(word).values.tolist() == [[1000.0, 2000.0, 3000.0]]
 
 
 def test_nothing_asked_for(imu_log: tuple[Log, Real]) -> None:
