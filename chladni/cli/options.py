@@ -114,6 +114,14 @@ Figures = Annotated[
 ]
 
 
+def _known_units(units: list[str] | None) -> list[str] | None:
+    """Refuse a unit that can't be one before a log is read for minutes."""
+    from chladni.signals.shown_units import units_by_quantity
+
+    units_by_quantity(units or ())
+    return units
+
+
 Unit = Annotated[
     list[str] | None,
     typer.Option(
@@ -121,6 +129,7 @@ Unit = Annotated[
         metavar="UNIT",
         help="Count channels of this quantity so: g, mm/s, kN, ...; once for each quantity. SI if not given.",
         show_default=False,
+        callback=_known_units,
     ),
 ]
 Band = Annotated[

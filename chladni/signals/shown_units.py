@@ -29,6 +29,28 @@ _USUAL = {
 _CHANNELS = ("channels", "responses", "references")
 
 
+def units_by_quantity(units: Sequence[str]) -> dict[str, str]:
+    """Give each unit that was asked for by the SI unit of its quantity.
+
+    Raises
+    ------
+    SetupError
+        When a unit isn't known, or two are of one quantity.
+
+    Examples
+    --------
+    >>> units_by_quantity(["g", "kN"])
+    {'m/s^2': 'g', 'N': 'kN'}
+    """
+    asked: dict[str, str] = {}
+    for unit in units:
+        _, si_unit = si_factor(unit)
+        if si_unit in asked:
+            raise SetupError(f"--unit {asked[si_unit]} and --unit {unit} are of one quantity; give one of them")
+        asked[si_unit] = unit.strip()
+    return asked
+
+
 def in_units(value: ValueT, units: Names | None) -> ValueT:
     """Give a value with its channels in other units of the same quantities; other channels stay as they are.
 
@@ -61,7 +83,7 @@ def all_in_units(values: Sequence[ValueT], units: Names | None) -> tuple[ValueT,
     """Give several values of one log in other units, see `in_units`; each unit fits a channel of one."""
     if not units:
         return tuple(values)
-    asked = _by_si(as_names(units))
+    asked = units_by_quantity(as_names(units))
     held = [channel.unit for value in values for channel in _channels(value)]
     for si_unit, unit in asked.items():
         if si_unit not in held:
@@ -76,7 +98,7 @@ def synthesis_in_units(modes: ModeSet, units: Names | None) -> ModeSet:
     """
     if not units or modes.fit is None:
         return modes
-    asked = _by_si(as_names(units))
+    asked = units_by_quantity(as_names(units))
     shown, over = ([asked.get(one.unit, one.unit) for one in of] for of in (modes.channels, modes.references))
     response, reference = (np.array([si_factor(unit)[0] for unit in names]) for names in (shown, over))
     factors = (reference / response[:, np.newaxis])[..., np.newaxis]
@@ -86,16 +108,6 @@ def synthesis_in_units(modes: ModeSet, units: Names | None) -> ModeSet:
         references=tuple(replace(one, unit=unit) for one, unit in zip(modes.references, over, strict=True)),
         fit=replace(modes.fit, synthesised=modes.fit.synthesised * factors),
     )
-
-
-def _by_si(units: Sequence[str]) -> dict[str, str]:
-    asked: dict[str, str] = {}
-    for unit in units:
-        _, si_unit = si_factor(unit)
-        if si_unit in asked:
-            raise SetupError(f"--unit {asked[si_unit]} and --unit {unit} are of one quantity; give one of them")
-        asked[si_unit] = unit.strip()
-    return asked
 
 
 def _misfit(unit: str, si_unit: str, held: Sequence[str]) -> str:

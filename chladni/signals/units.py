@@ -5,7 +5,6 @@ The symbols and their scales are in ``units.txt``, read by pint on first need; S
 
 import re
 from collections.abc import Callable
-from difflib import get_close_matches
 from functools import lru_cache
 from math import isfinite
 from pathlib import Path
@@ -21,6 +20,7 @@ from chladni.signals.unit_text import (
     symbol_as_written,
     write,
 )
+from chladni.signals.wording import near_words
 
 #: Symbols that results are written in; they are their own SI form.
 SI_SYMBOLS = frozenset(
@@ -282,7 +282,7 @@ def _scaled(prefix: str, name: str) -> Scaled:
 def _advice(symbol: str, registry: Any) -> str:
     known = sorted(name for name in map(str, registry) if len(name) <= len(symbol) + 2)
     other_case = {registry.get_symbol(prefix + name) for prefix, name in _readings(symbol, case_sensitive=False)}
-    near = sorted(other_case) or get_close_matches(symbol, known, n=3, cutoff=0.5)
+    near = sorted(other_case) or near_words(symbol, known, count=3)
     joined = [f"{symbol[0]} {symbol[1:]}"] if len(symbol) == 2 and set(symbol) <= SI_SYMBOLS else []
     hint = f"; near: {', '.join(joined + near)}" if joined + near else ""
     return f"not known{hint}; units look like g, mm/s^2, N, kN/mm, deg/s"

@@ -65,6 +65,19 @@ def test_another_quantity_is_refused_in_one_line(run: Run, log: Path, command: s
     assert run(command, log, "--unit", "mm/s^2").code == 0
 
 
+@pytest.mark.parametrize(
+    ("units", "says"),
+    [(["furlong"], "unit 'furlong': not known; units look like"), (["g", "mm/s^2"], "of one quantity")],
+)
+@pytest.mark.parametrize("command", ["psd", "modes", "levels", "frf"])
+def test_what_can_be_no_unit_is_told_before_a_log_is_opened(
+    run: Run, command: str, units: list[str], says: str
+) -> None:
+    outcome = run(command, "isn't there.mcap", *(word for unit in units for word in ("--unit", unit)))
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert says in outcome.err
+
+
 def test_a_band_without_lines_is_refused(run: Run, log: Path) -> None:
     outcome = run("psd", log, "--band", "900-1000")
     assert outcome.code == 2
