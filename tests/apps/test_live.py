@@ -113,6 +113,7 @@ def test_modes_of_the_present_are_followed_by_their_numbers(last: LiveState) -> 
         assert np.abs(truth_hz - mode.frequency_hz).min() < 0.05 * mode.frequency_hz
 
 
+@pytest.mark.nightly
 def test_the_gap_is_told_with_its_time(log: Path) -> None:
     events = [event for state in live(Bits(log.read_bytes()), modes_every_s=0) for event in state.events]
     gaps = [event for event in events if event.kind == "gap"]

@@ -67,7 +67,7 @@ def test_velocity_and_acceleration_are_the_derivatives() -> None:
 
 
 @pytest.mark.parametrize(
-    ("effort", "base_hz"), [(60.0, 0.1), pytest.param(60.0, 0.6, marks=pytest.mark.nightly), (12.0, 0.6)]
+    ("effort", "base_hz"), [(60.0, 0.1), *(pytest.param(one, 0.6, marks=pytest.mark.nightly) for one in (60.0, 12.0))]
 )
 def test_limits_hold_between_the_samples_of_every_grid(tmp_path: Path, effort: float, base_hz: float) -> None:
     robot = planar(tmp_path, effort)
@@ -112,6 +112,7 @@ def test_the_torque_makes_mujoco_accelerate_as_planned(tmp_path: Path) -> None:
         np.testing.assert_allclose(data.qacc, made.acceleration[:, column], atol=1e-8)
 
 
+@pytest.mark.nightly
 def test_two_links_in_a_plane_have_eleven_base_parameters_that_are_told_better(tmp_path: Path) -> None:
     made = chladni.excite(planar(tmp_path), seed=3)
     # Moment about the axis and two first moments of each link, an armature that isn't one with the first moment,
@@ -124,6 +125,7 @@ def test_two_links_in_a_plane_have_eleven_base_parameters_that_are_told_better(t
     assert alone.moved == ("elbow",)
 
 
+@pytest.mark.nightly
 def test_numbers_come_with_less_error_from_the_optimised_motion(tmp_path: Path) -> None:
     robot = planar(tmp_path)
     made = chladni.excite(robot, sample_rate_hz=20.0)

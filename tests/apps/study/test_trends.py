@@ -152,7 +152,7 @@ def test_an_equal_baseline_is_within_its_band_and_another_isnt(followed: Trends,
     assert not judge(followed, [LimitTable(of="mode", near_hz=4.0, change_percent=2.5)], stiff).outside
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_command_ends_with_3_when_something_left_its_band(
     year: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -37,7 +37,7 @@ def hammer_or_sensor():
     return contested(gain, *hypotheses, outputs=[2])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_hardening_against_a_stiffer_spring_asks_for_a_higher_level(hardening_or_stiffer):
     first = Search(*hardening_or_stiffer, seed=1).best()[0]
     assert first.change == "level"
@@ -46,7 +46,7 @@ def test_hardening_against_a_stiffer_spring_asks_for_a_higher_level(hardening_or
     assert first.nats > 10 * first.now_nats
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_measuring_as_advised_tells_hardening_from_a_stiffer_spring(hardening_or_stiffer):
     model, log, _, candidates, floor = hardening_or_stiffer
     apart = candidates[0].log_evidence - candidates[1].log_evidence

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.records.diagnosis import Diagnosis
@@ -47,6 +48,7 @@ def test_one_below_the_noise_is_none() -> None:
     assert found(log(constant=0.5)).verdict == "none"
 
 
+@pytest.mark.nightly
 def test_beside_another_cause_it_is_told_without_a_name() -> None:
     answer = found(log(constant=30.0, gain=1.3))
     assert [one.effect for one in answer.causes] == ["gain_error"]
@@ -59,6 +61,7 @@ def test_left_out_it_is_told_too() -> None:
     assert any("beside the model all the time" in one for one in answer.remarks)
 
 
+@pytest.mark.nightly
 def test_where_something_unknown_acts_it_is_told_too() -> None:
     made = log(constant=30.0)
     # Nothing of the few words bends a sensor's signal.

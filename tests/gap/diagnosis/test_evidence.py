@@ -73,6 +73,7 @@ def test_two_forces_that_two_sensors_cannot_tell_apart_are_not_tried(both: Study
     assert [one.site.name for one in evidence(few, believing(few), named(SPRING, FRICTION))] == ["hand"]
 
 
+@pytest.mark.nightly
 def test_beside_an_error_of_a_sensor_there_is_the_force_alone(both: Study) -> None:
     (only,) = evidence(both, believing(both), named(FRICTION, GAIN))
     assert only.site.name == "elbow"

@@ -120,6 +120,7 @@ def test_friction_by_another_law_is_named():
     assert cause.parameters[next(iter(cause.parameters))].unit == "N"
 
 
+@pytest.mark.nightly
 def test_what_was_found_is_simulated():
     found, _ = of_friction()
     signals = found.signals

@@ -122,6 +122,7 @@ def test_the_leading_place_is_paired_with_those_that_were_not_followed(study: St
     assert {pair.places[1] for pair in pairs} == set(study.location.places) - {first.places[0]}
 
 
+@pytest.mark.nightly
 def test_a_place_that_explains_as_much_as_the_leading_ones_is_paired_with_all_too(study: Study) -> None:
     first, second, third = study.location.ranked[:3]
     followed = {one.places[0] for one in (first, second, third)}

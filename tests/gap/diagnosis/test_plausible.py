@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from chladni.gap.diagnosis import plausible
 from chladni.gap.diagnosis.plausible import (
@@ -39,6 +40,7 @@ def left_by(places):
     return [one.profile.chi for one in places]
 
 
+@pytest.mark.nightly
 def test_a_place_that_explains_less_than_another_one_is_left_out() -> None:
     study = study_of(arm(), measured(seconds=2.0), leave_out=frozenset(), own={})
     location = study.location

@@ -110,9 +110,10 @@ def test_a_second_cause_is_named_where_it_is_a_share_of_the_gap_that_a_model_is_
 
 
 # Of two sensors forces at two places leave nothing, whatever they are.
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "outputs",
-    [("acc_column", "acc_arm", "acc_wrist"), pytest.param(("acc_arm", "acc_wrist"), marks=pytest.mark.nightly)],
+    [("acc_column", "acc_arm", "acc_wrist"), ("acc_arm", "acc_wrist")],
 )
 def test_a_load_and_a_late_sensor_are_named_together_and_pass_for_no_hold(outputs: tuple[str, ...]) -> None:
     # Half a sample is what another hold of the input shifts all by: with the load alone it left a tenth less.

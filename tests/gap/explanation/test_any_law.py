@@ -39,7 +39,7 @@ def left_at(effect, name: str) -> float:
     return left_by_any_law(location, located, site)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("word", "values"), LAWS)
 def test_a_law_of_the_joint_is_followed_whatever_its_name(word: str, values: dict[str, float]) -> None:
     assert left_at(chladni.attached(word, "shoulder", values), "shoulder") < 0.12

@@ -77,6 +77,7 @@ def test_a_second_linear_word_is_found_beside_a_first_one() -> None:
     assert best.effects[1].values["mass"] == pytest.approx(1.5, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_the_search_names_what_is_no_force_at_any_place() -> None:
     log = measured((chladni.attached("gyroscopic", "column~wrist", {"coefficient": 60.0}),))
     found = diagnose(arm(), [log], leave_out=all_but("gyroscopic"))

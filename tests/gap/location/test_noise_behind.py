@@ -11,7 +11,7 @@ from tests.gap.arm import arm, measured, with_outputs
 
 
 # Below what a model is granted to be wrong by, and above.
-@pytest.mark.parametrize("noise", [0.001, 0.02])
+@pytest.mark.parametrize("noise", [pytest.param(0.001, marks=pytest.mark.nightly), 0.02])
 def test_a_floor_behind_a_force_is_that_of_the_noise(noise: float) -> None:
     late = chladni.attached("delay", "shaker", {"delay": 0.003})
     log = measured((late,), seconds=4.0, noise=noise)

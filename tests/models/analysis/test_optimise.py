@@ -93,7 +93,7 @@ def test_a_quantity_that_doesn_t_exist_says_so() -> None:
     assert "there is none" in best.advice[0]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_instrument_knows_what_steps_and_what_counts() -> None:
     servo = INSTRUMENTS["dc-servo"]
     wish = Wish(quantity="overshoot", sense="at_most", limit=2.0)
@@ -103,6 +103,7 @@ def test_an_instrument_knows_what_steps_and_what_counts() -> None:
     assert of_page.wished_after[0].value == pytest.approx(2.0, rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_the_same_seed_gives_the_same_values() -> None:
     first, second = (optimise(oscillator(), ["c", "m"], damping_ratio_at_least(0.5), seed=3) for _ in range(2))
     assert first.values == second.values

@@ -248,6 +248,7 @@ def test_a_websocket_says_where_it_comes_from(port: int) -> None:
     assert wire.ask(port, f"/{NAME}/ws", *wire.upgrade_lines(token)).status == 403
 
 
+@pytest.mark.nightly
 def test_nobody_chooses_the_name_of_a_page(port: int) -> None:
     from bokeh.util.token import get_session_id, get_token_payload
 
