@@ -25,7 +25,7 @@ from chladni.gap.records.diagnosis import (
     TimeShare,
     Where,
 )
-from chladni.gap.records.log_use import LogUse
+from chladni.gap.records.measurement import LogUse
 from chladni.models.core.simulation import Simulation
 from chladni.models.effects.attached_effect import attached
 from chladni.models.files.model_file import load_model

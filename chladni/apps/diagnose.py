@@ -11,8 +11,7 @@ from chladni.apps.robot_gap import Topics, robot_gap
 from chladni.apps.sources import Span, joined
 from chladni.gap.comparison.measuring import MatchedLog, matched_log
 from chladni.gap.records.diagnosis import Diagnosis
-from chladni.gap.records.log_use import LogUse
-from chladni.gap.records.measurement import Measurement
+from chladni.gap.records.measurement import LogUse, Measurement
 from chladni.io.log import Log, open_log
 from chladni.io.log_info import some_of
 from chladni.models.core.model import Model

@@ -69,7 +69,7 @@ def tuned_model(
         When the log lacks a channel of an input, or holds no output.
     """
     # They compile what they simulate with, which a look at the façade shouldn't pay for.
-    from chladni.gap.comparison.quiet_floor import quiet_floor
+    from chladni.gap.comparison.whitening import quiet_floor
     from chladni.gap.plant.free_run import FreeRun
     from chladni.gap.tuning.output_error import fit_output_error
 

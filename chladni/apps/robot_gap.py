@@ -6,7 +6,7 @@ from pathlib import Path
 
 from chladni.apps.sources import Span
 from chladni.gap.records.diagnosis import Diagnosis
-from chladni.gap.records.log_use import LogUse
+from chladni.gap.records.measurement import LogUse
 from chladni.io.log import Log, open_log
 from chladni.models.effects.wording import nearest
 from chladni.robots.joint_log import JointLog, joint_log

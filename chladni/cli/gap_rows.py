@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from chladni.apps.gap_by_level import GapByLevel
     from chladni.apps.gap_comparison import GapComparison
     from chladni.gap.records.diagnosis import Diagnosis, Where
-    from chladni.gap.records.log_use import LogUse
+    from chladni.gap.records.measurement import LogUse
     from chladni.viewers.gap_tables import Table
 
 # Bands and regimes with less of the gap than this don't tell where it lies.

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Closing, Diagnosis, FittedNumber
-from chladni.gap.records.log_use import LogUse
+from chladni.gap.records.measurement import LogUse
 from chladni.gap.records.robot import site_words
 from chladni.viewers.effect_words import cause_phrase, effect_at, effect_heading
 from chladni.viewers.engineering import chance, engineering, percent

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chladni.gap.calibration import CYCLES, LISTED, MOST, SAMPLES_A_CYCLE
-from chladni.gap.comparison.short_log import modes_of, shortness
-from chladni.gap.comparison.unstable_model import instability
+from chladni.gap.comparison.doubts import instability, modes_of, shortness
 from chladni.gap.comparison.whole_stretch import Read, good_samples, whole_stretch
 from chladni.gap.records.measurement import Measurement
 from chladni.io.log_info import some_of

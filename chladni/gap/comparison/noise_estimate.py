@@ -18,10 +18,9 @@ from chladni.gap.calibration import (
     SAME,
     SOME,
 )
-from chladni.gap.comparison.autoregressive import noise_floor_of
-from chladni.gap.comparison.local_rational import POLES, local_fit
+from chladni.gap.comparison.local_rational import POLES, ResidualSpectra, local_fit
 from chladni.gap.comparison.periodicity import periods_of
-from chladni.gap.comparison.residual_spectra import ResidualSpectra
+from chladni.gap.comparison.whitening import noise_floor_of
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Mask, Real

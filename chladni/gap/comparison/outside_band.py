@@ -10,7 +10,6 @@ from scipy import fft
 from chladni.gap.calibration import FAR, FEWEST, NOTICED, SMOOTH
 from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
 from chladni.gap.comparison.local_rational import unreached
-from chladni.gap.comparison.motion_functions import even_functions, odd_functions
 from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Complex, Index, Mask, Real
@@ -143,3 +142,16 @@ def _share(basis: Complex, targets: Complex) -> float:
     left = np.sum(np.abs(unreached(regressors, targets)) ** 2, axis=(0, 1))
     whole = np.sum(np.abs(targets) ** 2, axis=(0, 1))
     return float(1 - np.mean(left / whole) * _LINES / (_LINES - regressors.shape[2]))
+
+
+def even_functions(displacement: Real) -> Real:
+    """``[function, ..., sample]`` of a displacement ``[..., sample]`` of about unit RMS: abs(d), d^2, dead zones."""
+    size = np.abs(displacement)
+    return np.array([size, displacement**2, *(np.maximum(size - zone, 0.0) for zone in (1.0, 2.0))])
+
+
+def odd_functions(displacement: Real, velocity: Real) -> Real:
+    """``[function, ..., sample]``: d abs(d), d^3, dead zones with the sign of d, and the sign of the velocity."""
+    size, side = np.abs(displacement), np.sign(displacement)
+    beyond = [side * np.maximum(size - zone, 0.0) for zone in (1.0, 2.0)]
+    return np.array([displacement * size, displacement**3, *beyond, np.sign(velocity)])

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chladni.gap.calibration import CYCLES, FORMS, LITTLE, PLACES, SAMPLES_A_CYCLE, SOME, TAIL
-from chladni.gap.comparison.short_log import modes_of
+from chladni.gap.comparison.doubts import modes_of
 from chladni.gap.design.experiment import Change, Experiment
 from chladni.gap.plant.windows import windows_for
 from chladni.gap.records.measurement import Measurement

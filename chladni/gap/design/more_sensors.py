@@ -11,7 +11,7 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.models.structures.structure_model import StructureModel
 from chladni.models.structures.structure_output import Measure, StructureOutput
-from chladni.signals.arrays import Real
+from chladni.signals.arrays import Complex, Real
 
 _WORDS: dict[Measure, str] = {
     "acceleration": "an accelerometer at",
@@ -107,3 +107,26 @@ def _free(name: str, taken: set[str]) -> str:
         name += "_"
     taken.add(name)
     return name
+
+
+def angles_deg(patterns: Complex, chosen: Sequence[int]) -> Real:
+    """Angle between the patterns of each two sites on some outputs, ``[site, site]``, 0 to 90 degrees.
+
+    A force of any shape is free on every line, so only the direction over the outputs tells: with one output all
+    angles are 0. The mean over the lines of the squared sine is taken.
+
+    Examples
+    --------
+    Two sites that two sensors see apart, and one sensor alone doesn't:
+
+    >>> patterns = np.array([[[1.0], [0.0]], [[1.0], [1.0]]], dtype=np.complex128)
+    >>> angles_deg(patterns, [0, 1]).round(3).tolist(), angles_deg(patterns, [0]).tolist()
+    ([[0.0, 45.0], [45.0, 0.0]], [[0.0, 0.0], [0.0, 0.0]])
+    """
+    seen = patterns[:, list(chosen)]
+    size = np.sqrt(np.sum(np.abs(seen) ** 2, axis=1, keepdims=True))
+    unit = seen / np.where(size > 0, size, 1.0)
+    along = np.abs(np.einsum("iol,kol->ikl", unit.conj(), unit)) ** 2
+    # A line on which a site prints nothing tells nothing.
+    sine = np.where(size[:, 0][:, None] * size[:, 0][None] > 0, np.maximum(1.0 - along, 0.0), 0.0)
+    return np.asarray(np.degrees(np.arcsin(np.sqrt(np.clip(sine.mean(axis=-1), 0.0, 1.0)))), dtype=np.float64)

@@ -2,8 +2,7 @@
 
 from collections.abc import Collection, Sequence
 
-from chladni.gap.design.design import Design
-from chladni.gap.design.experiment import Change
+from chladni.gap.design.experiment import Change, Design
 from chladni.gap.design.search import Search
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.tunable import Tunables

@@ -8,9 +8,8 @@ from chladni.gap.calibration import LONGEST, STEP
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.law_plant import Setting, fine_run, slopes_of
-from chladni.gap.plant.linear_run import can_run
+from chladni.gap.plant.linear_run import can_run, decay
 from chladni.gap.plant.tunable import Tunables
-from chladni.gap.tuning.decay import decay
 from chladni.gap.tuning.effect_scale import EffectNumber, effect_numbers, with_numbers
 from chladni.signals.arrays import Real
 

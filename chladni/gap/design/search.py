@@ -8,8 +8,7 @@ import numpy as np
 
 from chladni.gap.calibration import LINES, LITTLE, PLACES, PROFILE_STEPS, ZERO
 from chladni.gap.design.course import Course
-from chladni.gap.design.design import Design
-from chladni.gap.design.experiment import Change, Experiment
+from chladni.gap.design.experiment import Change, Design, Experiment
 from chladni.gap.design.experiments import Reach
 from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise_of, with_sensors
 from chladni.gap.design.rival import Rival

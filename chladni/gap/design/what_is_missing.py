@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from chladni.gap.calibration import CYCLES_ASKED, LINES, LITTLE, LOCATED, LOUD, NEAR_DEG, ZERO
-from chladni.gap.comparison.short_log import modes_of
+from chladni.gap.comparison.doubts import modes_of
 from chladni.gap.design.experiments import excited_band_hz
-from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise_of, with_sensors
-from chladni.gap.design.site_angles import angles_deg
+from chladni.gap.design.more_sensors import MoreSensor, angles_deg, more_sensors, with_noise_of, with_sensors
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_view import LinearView
 from chladni.gap.plant.places import Site, placed, printed_patterns, sites_of

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from chladni.gap.calibration import ALONE, CLOSE, FORMS, PLACES, SOME
-from chladni.gap.comparison.scale_doubt import scale_doubt
+from chladni.gap.comparison.doubts import scale_doubt
 from chladni.gap.design.next_measurement import next_measurement
 from chladni.gap.design.what_is_missing import level_missing, sensor_missing, what_is_missing
 from chladni.gap.diagnosis.study import Study

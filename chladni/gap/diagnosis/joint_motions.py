@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from chladni.gap.comparison.amplitude import amplitude
+from chladni.gap.comparison.log_regimes import amplitude
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.location.locate import lowest_hz
 from chladni.gap.location.recovered import Recovered

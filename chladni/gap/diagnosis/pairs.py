@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from chladni.gap.calibration import ALIKE, ALONE, BEGUN, CAUSES, FITS, FORMS, LEADS, PAIR_GAIN, PLACES, SAME
+from chladni.gap.comparison.whitening import with_law_error
 from chladni.gap.diagnosis.following import Entered, followed, is_lost_beside
 from chladni.gap.diagnosis.plausible import least_left, near_places, sound
 from chladni.gap.diagnosis.study import Study
@@ -17,7 +18,6 @@ from chladni.gap.explanation.linear_words import linear_hypotheses
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.explanation.wrong_values import wrong_values
 from chladni.gap.location.locate import Located, Location, locate, located_pairs
-from chladni.gap.tuning.law_error import with_law_error
 from chladni.models.core.model import Model
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.arrays import Real

@@ -6,9 +6,9 @@ import numpy as np
 
 from chladni.gap.calibration import LISTED
 from chladni.gap.comparison.distortion import Distortion
+from chladni.gap.comparison.doubts import instability_found
 from chladni.gap.comparison.outside_band import products_outside
 from chladni.gap.comparison.shares import pooled_gap
-from chladni.gap.comparison.unstable_model import instability_found
 from chladni.gap.diagnosis.study import Study, step_error
 from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.hypothesis import Contestant

@@ -8,8 +8,8 @@ import numpy as np
 from chladni.gap.calibration import FAR, HARDLY_ANY, MOST, STEP
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
-from chladni.gap.comparison.quiet_floor import quiet_floor
 from chladni.gap.comparison.shares import pooled_gap
+from chladni.gap.comparison.whitening import quiet_floor
 from chladni.gap.diagnosis.told_holds import with_told_holds
 from chladni.gap.explanation.contest import Contest, training_mask
 from chladni.gap.explanation.known_states import KnownStates

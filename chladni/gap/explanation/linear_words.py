@@ -14,8 +14,7 @@ from chladni.gap.explanation.screen import Regression, Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
 from chladni.gap.location.profile import Elimination, Profile, profiled
 from chladni.gap.plant.black_box import BlackBox
-from chladni.gap.plant.further_numbers import with_further
-from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.linear_problem import LinearProblem, with_further
 from chladni.gap.plant.places import sites_of
 from chladni.gap.side_by_side import side_by_side
 from chladni.gap.tuning.effect_scale import effect_numbers, with_numbers

@@ -8,10 +8,9 @@ import numpy as np
 
 from chladni.gap.calibration import BLOCK, CLEARLY, COVERAGE, DRAWS, FAR, LINES_A_TERM
 from chladni.gap.comparison.outside_band import products_outside
-from chladni.gap.location.followed_motion import unseen_losses
 from chladni.gap.location.level_change import LevelChange, level_change
 from chladni.gap.location.modal_paths import ModalPaths, modal_paths
-from chladni.gap.location.printed_pattern import one_direction_share, pattern_losses
+from chladni.gap.location.path_fits import one_direction_share, pattern_losses, unseen_losses
 from chladni.gap.location.sensor_location import SensorLocation, SensorSite
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Index, Mask, Real

@@ -8,7 +8,7 @@ from scipy import fft
 
 from chladni.gap.calibration import ALIKE
 from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
-from chladni.gap.comparison.motion_functions import even_functions, odd_functions
+from chladni.gap.comparison.outside_band import even_functions, odd_functions
 from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Complex, Index, Mask, Real

@@ -22,7 +22,7 @@ from chladni.gap.calibration import (
     RIDGE,
     SEGMENTS,
 )
-from chladni.gap.comparison.short_log import modes_of
+from chladni.gap.comparison.doubts import modes_of
 from chladni.gap.location.noise_behind import noise_behind
 from chladni.gap.location.profile import Profile, profile_at, profiled
 from chladni.gap.plant.linear_problem import LinearProblem

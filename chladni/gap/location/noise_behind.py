@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from chladni.gap.calibration import FAINT_WISH, FLOOR_BANDS, HARDLY_ANY, LESS, SAME
-from chladni.gap.comparison.autoregressive import noise_floor_of
+from chladni.gap.comparison.whitening import noise_floor_of
 from chladni.gap.location.profile import Profile, Projection
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.record_lines import all_lines

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from chladni.gap.calibration import COVERAGE
-from chladni.gap.records.log_use import LogUse
+from chladni.gap.records.measurement import LogUse
 from chladni.gap.records.robot import JointMotion, TorqueMap
 from chladni.robots.machine import Machine
 from chladni.signals.arrays import Real

@@ -69,3 +69,29 @@ def _require_in_range(log: str, names: tuple[str, ...], signals: Real) -> None:
         fault = out_of_range(largest) if isfinite(largest) else "holds values that aren't finite; leave it out"
         if fault is not None:
             raise EstimateError(f"{log}: {name!r} {fault}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogUse:
+    """How much of a log was used, and what was lost of it.
+
+    Attributes
+    ----------
+    log
+        Name, for people.
+    used_s, recorded_s
+        Length of what the diagnosis saw, and of what the log holds in the part that was asked for, seconds.
+    sample_rate_hz
+        Samples a second.
+    losses
+        Sentences on damage and stretches that were dropped; they stand among the remarks, too.
+    warnings
+        Sentences that come before any answer, which means little with them; likewise.
+    """
+
+    log: str
+    used_s: float
+    recorded_s: float
+    sample_rate_hz: float
+    losses: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()

@@ -8,7 +8,7 @@ from shlex import quote
 import numpy as np
 
 from chladni.gap.calibration import CLOSE, LEAST_SHARE
-from chladni.gap.design.design import Design
+from chladni.gap.design.experiment import Design
 from chladni.gap.records.diagnosis import PARAMETER, Candidate
 from chladni.gap.records.robot import site_words
 from chladni.gap.robots.contest import Contest

@@ -8,8 +8,7 @@ import numpy as np
 from chladni.gap.calibration import JITTER, RIDGE, RUNAWAY, STEP, UNNOTICED, WIDE, ZERO
 from chladni.gap.plant.free_run import FreeRun, initial_states
 from chladni.gap.plant.law_plant import LawRunResult, Setting, coarse_run, fine_run, slopes_of
-from chladni.gap.plant.linear_run import can_run
-from chladni.gap.tuning.decay import decay
+from chladni.gap.plant.linear_run import can_run, decay
 from chladni.gap.tuning.effect_scale import EffectNumber, with_numbers
 from chladni.gap.tuning.residual import Residual, Whitening, likelihood_cost, weights
 from chladni.models.effects.attached_effect import AttachedEffect

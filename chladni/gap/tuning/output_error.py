@@ -7,13 +7,13 @@ from typing import TypedDict
 import numpy as np
 
 from chladni.gap.calibration import DAMPINGS, GAINED, ITERATIONS, LITTLE, LONGEST, PRECISION, RIDGE, ZERO
+from chladni.gap.comparison.whitening import with_law_error
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.bounded_step import bounded_step
 from chladni.gap.tuning.coloured_spread import coloured_information
 from chladni.gap.tuning.effect_scale import effect_numbers
 from chladni.gap.tuning.fit_problem import Evaluation, FitProblem, Point, Slopes
-from chladni.gap.tuning.law_error import with_law_error
 from chladni.gap.tuning.residual import Whitening
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.arrays import Mask, Real

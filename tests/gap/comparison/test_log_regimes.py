@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.comparison.amplitude import amplitude
-from chladni.gap.comparison.log_regimes import cycles_of, log_regimes
+from chladni.gap.comparison.log_regimes import amplitude, cycles_of, log_regimes
 from chladni.gap.records.measurement import Measurement
 from tests.gap.comparison import made_measurements as made
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.design.design import Design
+from chladni.gap.design.experiment import Design
 from chladni.gap.design.experiments import Reach
 from chladni.gap.design.next_measurement import next_measurement, sentence
 from chladni.gap.design.search import Search

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.design.site_angles import angles_deg
+from chladni.gap.design.more_sensors import angles_deg
 from chladni.gap.design.what_is_missing import what_is_missing
 from chladni.models.structures.structure_output import StructureOutput
 from tests.gap.made_log import RATE_HZ, band_noise, measured, three_bodies, white_floor

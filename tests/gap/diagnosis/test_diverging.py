@@ -9,7 +9,7 @@ from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.signals.errors import EstimateError
-from tests.gap.comparison.test_unstable_model import EDGE, loop
+from tests.gap.comparison.test_doubts import EDGE, loop
 from tests.gap.made_log import band_noise, chain, measured
 
 NONE = frozenset(CATALOGUE)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chladni.gap.comparison.amplitude import amplitude
+from chladni.gap.comparison.log_regimes import amplitude
 from chladni.gap.comparison.shares import regime_shares
 from chladni.gap.diagnosis.joint_motions import joint_motions
 from chladni.gap.plant.free_run import FreeRun

@@ -7,7 +7,7 @@ import numpy as np
 from chladni.gap.diagnosis.remarks import remarks_on
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.plant.free_run import FreeRun
-from tests.gap.comparison.test_unstable_model import EDGE, loop
+from tests.gap.comparison.test_doubts import EDGE, loop
 from tests.gap.made_log import measured, white_floor
 
 

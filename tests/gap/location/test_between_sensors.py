@@ -9,10 +9,9 @@ import pytest
 import chladni
 from chladni.gap.comparison.linear_approximation import best_linear_approximation
 from chladni.gap.location.between_sensors import locate_between_sensors
-from chladni.gap.location.followed_motion import unseen_losses
 from chladni.gap.location.level_change import level_change
 from chladni.gap.location.modal_paths import modal_paths
-from chladni.gap.location.printed_pattern import one_direction_share, pattern_losses
+from chladni.gap.location.path_fits import one_direction_share, pattern_losses, unseen_losses
 from chladni.signals.errors import EstimateError
 from tests.gap.comparison import made_measurements
 from tests.gap.location import made_levels as made

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from chladni.gap.tuning.decay import decay
+from chladni.gap.plant.linear_run import decay
 from chladni.gap.tuning.residual import Whitening, likelihood_cost, weights
 from chladni.models.integrator.integrator import Integrator
 from chladni.signals.errors import EstimateError

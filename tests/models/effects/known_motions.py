@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chladni.gap.simulators.effects_around import lone_joint
+from chladni.gap.simulators.wrapped_simulator import lone_joint
 from chladni.models.core.port import Port
 from chladni.models.effects.trial import TrialMotion
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.gap.simulators.effects_around import joint_law, with_signals_changed
+from chladni.gap.simulators.wrapped_simulator import joint_law, with_signals_changed
 from chladni.models.core.port import Port, Terminal
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.signals.errors import ModelError
