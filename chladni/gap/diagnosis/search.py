@@ -10,7 +10,6 @@ import numpy as np
 
 from chladni.gap.calibration import (
     BEGUN,
-    BEYOND_DOUBT,
     CAUSES,
     FITS,
     FORMS,
@@ -25,7 +24,7 @@ from chladni.gap.diagnosis.following import followed
 from chladni.gap.diagnosis.pairs import exchanged, paired_causes, second_causes, shared, without_one
 from chladni.gap.diagnosis.plausible import is_lost, is_one_force, least_left, plausible_places, sound
 from chladni.gap.diagnosis.study import Study, contest_over, over_model
-from chladni.gap.diagnosis.told_holds import other_holds
+from chladni.gap.diagnosis.told_holds import changed, other_holds, price
 from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.hypotheses import (
     effect_hypotheses,
@@ -170,16 +169,19 @@ class Search:
         """Ask what inputs did between samples behind the leading causes, which may have hidden it.
 
         What acts at an input itself could be any hold as far as an unknown force there tells. Where a hold leaves
-        more than noise and details of laws, what else is missing may pass for it.
+        more than noise and details of laws, what else is missing may pass for it. One that was told before its causes
+        were known is a guess, however well it fits: what it's worth shows beside the causes that others have.
         """
         study = self.study
-        leads = [one.best for one in self.belief.sets if one.causes][:PLACES] if self.is_open else []
+        doubted = self.is_open or study.model is not study.stated
+        leads = [one.best for one in self.belief.sets if one.causes][:PLACES] if doubted else []
         model, nats = study.model, max((one.log_evidence for one in leads), default=0.0)
-        for others in other_holds(study.model, study.measurement) if leads else ():
-            for other in [model.with_holds(one) for one in others]:
+        for others in other_holds(study.stated, study.measurement) if leads else ():
+            for other in changed(model, others):
                 found = contest_over(study, other).enter_all([_from_fit(one) for one in leads])
                 best = max(found, key=lambda one: one.log_evidence, default=leads[0])
-                if best.log_evidence > nats + BEYOND_DOUBT and self.belief.unexplained(best) < WORTH:
+                dearer = price(study.stated, other) - price(study.stated, model)
+                if best.log_evidence > nats + dearer and self.belief.unexplained(best) < WORTH:
                     model, nats = other, best.log_evidence
         if model is not study.model:
             begun = [_from_fit(one.best) for one in self.belief.sets[:BEGUN] if one.causes]

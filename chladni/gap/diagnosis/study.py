@@ -44,6 +44,8 @@ class Study:
     ----------
     model, measurement
         What is compared.
+    stated
+        The model as it was given: a hold that it states is a fact, one that was told is weighed to the end.
     location
         Where an unknown force explains the gap, with the noise behind it.
     contest
@@ -59,6 +61,7 @@ class Study:
     """
 
     model: Model
+    stated: Model
     measurement: Measurement
     location: Location
     contest: Contest
@@ -122,14 +125,15 @@ def study_of(
     noise = _with_rounding(noise, model, measurement, lattices)
     tunables = Tunables.of(model)
     location = locate(model, measurement, noise, tunables)
-    told = with_told_holds(model, location)
-    if told is not model:
-        model, location = told, locate(told, measurement, noise, tunables)
+    stated, model = model, with_told_holds(model, location)
+    if model is not stated:
+        location = locate(model, measurement, noise, tunables)
     windows = None if _runs_free(model, location) else windows_for(model, measurement)
     run = FreeRun(model, measurement, windows=windows)
     training = training_of(measurement, windows)
     return Study(
         model=model,
+        stated=stated,
         measurement=measurement,
         location=location,
         contest=Contest(run, location.problem, training),

@@ -1,5 +1,7 @@
 """What inputs did between their samples, told from the log, whatever else is missing."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from chladni.gap.calibration import BEYOND_DOUBT, PLACES
@@ -17,8 +19,10 @@ def with_told_holds(model: Model, location: Location) -> Model:
 
     What is missing somewhere hides what an input did between its samples. So each hold is weighed beside an unknown
     force at each of the leading places, and without any, parameters tuned anew: the evidence of the best of these.
+    That tells what the force was behind what is missing, as a lag makes any hold smooth: a hypothesis, which causes
+    are to compete with.
     Inputs whose hold the model states, which never move, or whose rate acts too, are left as they are; so are all
-    when the model leaves noise alone, and where no hold leads beyond doubt and brings all down to the noise.
+    when the model leaves noise alone, and where no hold is worth its price and brings all down to the noise.
 
     Parameters
     ----------
@@ -33,20 +37,30 @@ def with_told_holds(model: Model, location: Location) -> Model:
     tuned = location.tuned
     if tuned.misfit <= np.mean(highest_level(location.problem.noise)) * tuned.expected:
         return model
-    nats, _ = _weighed(model, location)
+    told, nats = model, _weighed(model, location)[0]
     for others in asked:
-        tried = [model.with_holds(one) for one in others]
-        found = [_weighed(one, location) for one in tried]
-        best = max(range(len(found)), key=lambda place: found[place][0])
-        # Where a hold doesn't bring all down to the noise, what else is missing may pass for it.
-        if found[best][0] > nats + BEYOND_DOUBT and not found[best][1]:
-            model, nats = tried[best], found[best][0]
-    return model
+        for tried in changed(told, others):
+            found, elsewhere = _weighed(tried, location)
+            # Where a hold doesn't bring all down to the noise, what else is missing may pass for it.
+            if found - price(model, tried) > nats - price(model, told) and not elsewhere:
+                told, nats = tried, found
+    return told
 
 
-def other_holds(model: Model, measurement: Measurement) -> list[list[dict[str, HoldKind]]]:
+def changed(model: Model, answers: Sequence[Mapping[str, HoldKind]]) -> list[Model]:
+    """Give the model with each of the answers that aren't its own holds anyway."""
+    tried = [model.with_holds(one) for one in answers]
+    return [one for one in tried if one.compile().holds != model.compile().holds]
+
+
+def price(stated: Model, told: Model) -> float:
+    """Nats of holds that a model doesn't state: of each kind of device beside those that it says, or means."""
+    return BEYOND_DOUBT * len(set(told.compile().holds) - set(stated.compile().holds))
+
+
+def other_holds(stated: Model, measurement: Measurement) -> list[list[dict[str, HoldKind]]]:
     """Give the questions that a log may answer, each with its answers: the hold of all inputs, then of each."""
-    rows = zip(model.compile().inputs, measurement.inputs, strict=True)
+    rows = zip(stated.compile().inputs, measurement.inputs, strict=True)
     asked = [
         one.name for one, signal in rows if one.hold is None and not one.derivatives and np.any(signal != signal[0])
     ]

@@ -10,7 +10,7 @@ from chladni.gap.diagnosis.own_signal import share_of_own_signal
 from chladni.gap.diagnosis.plausible import is_lost
 from chladni.gap.diagnosis.search import Search
 from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
-from chladni.gap.diagnosis.study import Study, over_floor, over_windows, step_error
+from chladni.gap.diagnosis.study import Study, over_floor, over_model, over_windows, step_error
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.location.locate import Located
 from chladni.gap.records.diagnosis import Verdict
@@ -74,7 +74,12 @@ def searched(study: Study, progress: Step) -> Search:
     """Search over the floor that was estimated, over a finer one, and over windows where a run can't follow."""
     progress = _rising(progress)
     search = Search(study)
-    search.run(_part(progress, 0.0, 0.7))
+    search.run(_part(progress, 0.0, 0.6))
+    if study.model is not study.stated and _verdict(search.belief) == "unknown":
+        # The hold was told beside an unknown force, and none that has a name goes with it.
+        stated = Search(over_model(study, study.stated))
+        stated.run(_part(progress, 0.6, 0.7))
+        search = search if _verdict(stated.belief) == "unknown" else stated
     finer = finer_floor(search.study, search.best)
     if finer is not None:
         # Behind what was found noise turns out lower than it was estimated: what was taken for it is another cause.
