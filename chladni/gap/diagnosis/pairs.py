@@ -140,6 +140,12 @@ def without_one(study: Study, both: Contestant) -> list[Contestant]:
     return sound(study, study.contest.enter_all(fewer))
 
 
+def words_of_kinds(study: Study, found: Contestant) -> frozenset[tuple[str, str]]:
+    """Give the kind of part that each effect of a fit acts at, with its word."""
+    kinds = _kinds(study)
+    return frozenset((kinds.get(one.site, one.site), one.effect) for one in found.fit.effects)
+
+
 def shared(study: Study, found: Contestant) -> list[Contestant]:
     """Enter the words of a fit at all sites of their kinds at once: parts of a kind are made alike.
 
@@ -162,11 +168,16 @@ def shared(study: Study, found: Contestant) -> list[Contestant]:
 
 def _elsewhere(study: Study, found: Contestant, effect: AttachedEffect) -> list[AttachedEffect]:
     """Give a little of an effect at the other sites of its kind; nothing of pairs, which a machine has many of."""
-    kinds = {site.name: site.kind for place in study.location.places for site in place.sites}
+    kinds = _kinds(study)
     kind, taken = kinds.get(effect.site), {one.site for one in found.fit.effects}
     if kind not in ("joint", "body", "input", "output") or effect.source is not None:
         return []
     return [little_of(effect, site=name) for name, other in kinds.items() if other == kind and name not in taken]
+
+
+def _kinds(study: Study) -> dict[str, str]:
+    """Kind of part of each site, by its name."""
+    return {site.name: site.kind for place in study.location.places for site in place.sites}
 
 
 def _behind(

@@ -21,7 +21,7 @@ from chladni.gap.calibration import (
 )
 from chladni.gap.diagnosis.belief import Belief
 from chladni.gap.diagnosis.following import followed
-from chladni.gap.diagnosis.pairs import exchanged, paired_causes, second_causes, shared, without_one
+from chladni.gap.diagnosis.pairs import exchanged, paired_causes, second_causes, shared, without_one, words_of_kinds
 from chladni.gap.diagnosis.plausible import is_lost, is_one_force, least_left, plausible_places, sound
 from chladni.gap.diagnosis.study import Study, contest_over, over_model
 from chladni.gap.diagnosis.told_holds import changed, other_holds, price
@@ -190,8 +190,17 @@ class Search:
             self.enter(begun)
 
     def _share(self) -> None:
-        """Look whether the words of what leads act at all parts of their kinds: one fit each."""
-        for lead in self._leads():
+        """Look whether the words of what leads act at all parts of their kinds: one fit each.
+
+        Like laws at a few of many parts are close, so each of these words is tried. Parts of a kind are made alike:
+        two words for them are no lead.
+        """
+        leads: dict[frozenset[tuple[str, str]], Contestant] = {}
+        for one in self.belief.sets:
+            words = words_of_kinds(self.study, one.best)
+            if words and len(dict(words)) == len(words):
+                leads.setdefault(words, one.best)
+        for lead in list(leads.values())[:LEADS]:
             if self.is_open:
                 self.add(shared(self.study, lead))
 

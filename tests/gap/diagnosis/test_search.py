@@ -129,6 +129,35 @@ def test_a_load_and_a_late_sensor_are_named_together_and_pass_for_no_hold(output
     assert search.study.model.compile().holds == arm().compile().holds
 
 
+def test_each_word_that_leads_is_tried_at_all_parts_of_its_kind(monkeypatch: pytest.MonkeyPatch) -> None:
+    # At two of three joints friction and hysteresis are close, whichever acts at all of them; both lead at the same
+    # sites. A word for each of two joints is a worse guess than either.
+    words = {"coulomb_friction": {"force": 4.0}, "hysteresis": {"force": 4.0, "yield": 1e-5}}
+    frictions = [attached("coulomb_friction", joint, {"force": 4.0}) for joint in ("shoulder", "elbow", "hand")]
+    study = study_of(arm(), measured(frictions, seconds=2.0, noise=0.005), leave_out=all_but("hysteresis"), own={})
+    search = Search(study)
+    search.found += study.contest.enter_all(
+        [
+            hypothesis_of(
+                (attached(first, "elbow", words[first]), attached(second, "hand", words[second])),
+                study.location.tuned.z,
+            )
+            for first in words
+            for second in words
+        ],
+        max_iterations=1,
+    )
+    search.__dict__.pop("belief", None)
+    monkeypatch.setattr(Search, "is_open", True)
+    tried: list[set[str]] = []
+    monkeypatch.setattr(
+        "chladni.gap.diagnosis.search.shared",
+        lambda _, lead: tried.append({one.effect for one in lead.hypothesis.effects}) or [],
+    )
+    search._share()
+    assert sorted(tried, key=str) == [{"coulomb_friction"}, {"hysteresis"}]
+
+
 @pytest.mark.nightly
 def test_a_hold_is_told_behind_a_cause_that_hid_it() -> None:
     # An unknown force at the input is any hold: only with the delay known the log tells which.
