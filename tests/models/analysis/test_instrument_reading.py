@@ -213,6 +213,7 @@ def test_the_exact_simulation_of_a_step_is_its_response() -> None:
     assert not needs_simulation(model.compile())
 
 
+@pytest.mark.nightly
 def test_a_dead_time_inside_a_loop_is_simulated() -> None:
     model = FunctionModel(parameters=oscillator().parameters, equations=lambda _: loop_with_dead_time(2.0, 0.3))
     reading = read_instrument(instrument_of(model))

@@ -139,11 +139,11 @@ def test_loops_of_sliders_are_the_backbone_twice_as_large() -> None:
 
 
 def test_along_a_known_motion_sliders_are_springs_that_are_cut_off() -> None:
-    d = 3 * YIELD * np.sin(np.linspace(0, 20, 4001)) * np.linspace(0, 1, 4001)
+    d = 3 * YIELD * np.sin(np.linspace(0, 20, 1001)) * np.linspace(0, 1, 1001)
     law = _sliders()
     yields, stiffnesses = np.reshape(law.parameters[1:], (2, -1))
     found = driven(
-        law, lambda t: np.interp(t, np.arange(4001), d), lambda t: np.interp(t, np.arange(4001), np.gradient(d)),
-        np.arange(4001.0),
+        law, lambda t: np.interp(t, np.arange(1001), d), lambda t: np.interp(t, np.arange(1001), np.gradient(d)),
+        np.arange(1001.0),
     )  # fmt: skip
     np.testing.assert_allclose(stops_along(d, yields, stiffnesses), found, atol=0.03 * FORCE)
