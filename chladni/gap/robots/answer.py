@@ -38,6 +38,7 @@ from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import Torques
 from chladni.gap.robots.trial import Confirmed, Trial
 from chladni.gap.robots.tuned import tuned_parameters
+from chladni.gap.robots.wider_laws import adds, not_told_apart
 from chladni.robots.dynamics import inertial_numbers
 from chladni.signals.arrays import Mask, Real
 
@@ -130,7 +131,7 @@ class Answer:
         return tuple(
             one
             for one in self.weighed
-            if one.probability >= NAMED and one.share >= LEAST_SHARE and one.is_told and one.is_felt
+            if one.of_any_law >= NAMED and one.share >= LEAST_SHARE and one.is_told and one.is_felt
         )
 
     @cached_property
@@ -239,6 +240,8 @@ class Weighed:
     ----------
     term, candidate
         The term, and what it's called.
+    probability, of_any_law
+        Of the word, and of it or a wider law that the log doesn't tell from it: either way something is named.
     acts
         Rows of the joints that it changes.
     is_told
@@ -252,6 +255,7 @@ class Weighed:
     term: Term
     candidate: Candidate
     probability: float
+    of_any_law: float
     share: float
     acts: tuple[int, ...]
     group: tuple[str, ...]
@@ -281,7 +285,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
     contest, best = solved.contest, solved.best
     term = best.terms[place]
     rest = contest.fit([*best.terms[:place], *best.terms[place + 1 :]], best)
-    # A law that holds this one as a special case, and needs no more of it, says the same.
+    # A law that holds this one as a special case says the same where it's told to need no more of it.
     found = alternatives(contest, best, place, _OTHERS)
     others = [
         found[0],
@@ -305,6 +309,12 @@ def _weighed(solved: Solved, place: int) -> Weighed:
         for one, part in zip(others[1:], weight[3:], strict=True)
         if one.terms[-1].word in words and one.terms[-1] in near
     )
+    # Where the log leaves open whether a law needs more, it's either word.
+    open_laws = dict(not_told_apart(contest, best, place))
+    named = float(weight[0]) + same
+    wider = named * sum(float(np.exp(nats / TEMPER)) for nats in open_laws.values())
+    near += [one for one, nats in open_laws.items() if nats > -CLOSE]
+    whole = (float(np.sum(weight)) + wider) / (1.0 - LAPSE)
     lost = rest.left.energy - best.left.energy
     # What tolerances take over when they're stretched is felt, too.
     strained = rest.strain - best.strain
@@ -313,7 +323,8 @@ def _weighed(solved: Solved, place: int) -> Weighed:
     return Weighed(
         term=term,
         candidate=candidate,
-        probability=(1.0 - LAPSE) * (float(weight[0]) + same) / float(np.sum(weight)),
+        probability=named / whole,
+        of_any_law=(named + wider) / whole,
         share=float(min(np.max(shares), 1.0)),
         acts=tuple(int(row) for row in (term.rows or acts)),
         group=tuple(dict.fromkeys([candidate.site, *(one.site for one in near if one.word in words)])),
@@ -332,7 +343,7 @@ def _adds(solved: Solved, fit: Fit, place: int) -> bool:
     """Whether what a law of a fit has beyond a plainer one is told."""
     term = fit.terms[place]
     if term.form is None or not term.adds_form:
-        return bool(_told(fit, place % len(fit.terms))[-1])
+        return adds(solved.contest, fit, place)
     spread = solved.spread.get((term.word, term.site, term.variant), term.form.high - term.form.low)
     return term.form.value > _SIGMAS * spread
 

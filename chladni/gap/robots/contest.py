@@ -337,6 +337,12 @@ class Contest:
         added = moments.power(moments.at_rows(numbers))
         return np.asarray(added / np.maximum(self._energy, np.maximum(self.count, 1.0)))
 
+    def power(self, term: Term, values: Real) -> float:
+        """Give the whitened energy of a term with values ``[number]``."""
+        at = self._places[id(term)]
+        moments = Moments.of(self._rows, at)
+        return float(np.sum(moments.power(moments.at_rows(values / term.scale))))
+
     def over_rounding(self, energy: Real) -> Real:
         """Give ``[row]``: RMS torque of a whitened energy, over what a description of its changes rounds."""
         power = energy / np.maximum(self.count, 1.0) * self.torques.noise**2
