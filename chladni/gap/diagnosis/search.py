@@ -67,6 +67,8 @@ class Search:
     def __init__(self, study: Study) -> None:
         self.begin_anew(study, [_without_cause(study)])
         self.states: KnownStates | None = None
+        #: Behind which holds were asked last.
+        self._held: list[Contestant] = []
         self.forces: Located | None = None
         self._tried: set[object] = set()
 
@@ -173,8 +175,10 @@ class Search:
         were known is a guess, however well it fits: what it's worth shows beside the causes that others have.
         """
         study = self.study
-        doubted = self.is_open or study.model is not study.stated
+        # However little of the gap a wrong hold leaves, it's no cause that must be worth a name.
+        doubted = self.belief.unexplained(self.best) > WORTH or study.model is not study.stated
         leads = [one.best for one in self.belief.sets if one.causes][:PLACES] if doubted else []
+        leads, self._held = [] if leads == self._held else leads, leads
         model, nats = study.model, max((one.log_evidence for one in leads), default=0.0)
         for others in other_holds(study.stated, study.measurement) if leads else ():
             for other in changed(model, others):

@@ -171,6 +171,20 @@ def test_a_hold_is_told_behind_a_cause_that_hid_it() -> None:
     assert search.study.model.compile().holds == ("zoh",)
 
 
+def test_a_wrong_hold_is_doubted_however_little_of_the_gap_it_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
+    # No hold was told at first, and the search is closed: nothing is left that is worth the name of a cause.
+    monkeypatch.setattr("chladni.gap.diagnosis.study.with_told_holds", lambda model, _: model)
+    late = attached("delay", "hammer", {"delay": 3.0 / RATE_HZ})
+    nominal, log, _ = driven("zoh", "low-passed", 0.01, 3, effects=[late])
+    study = study_of(nominal, log, leave_out=frozenset(CATALOGUE) - {"delay"}, own={})
+    monkeypatch.setattr(Search, "is_open", False)
+    search = Search(study)
+    search.enter([hypothesis_of((late,), study.location.tuned.z)])
+    search._other_holds()
+    assert study.model.compile().holds == ("foh",)
+    assert search.study.model.compile().holds == ("zoh",)
+
+
 @pytest.mark.parametrize(
     ("variant", "time_s"),
     [("first_order", 3e-4), pytest.param("second_order", 3e-4, marks=pytest.mark.nightly)],
