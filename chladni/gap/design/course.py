@@ -8,8 +8,7 @@ import numpy as np
 
 from chladni.gap.calibration import ALONE
 from chladni.gap.design.experiment import Experiment
-from chladni.gap.design.imitation import Part, sums_of
-from chladni.gap.design.rival import Prediction, Rival
+from chladni.gap.design.rival import Part, Prediction, Rival, sums_of
 from chladni.gap.plant.free_run import FreeRun, Windows
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor

@@ -7,8 +7,7 @@ import numpy as np
 
 from chladni.gap.calibration import EFFECTIVE_SAMPLES
 from chladni.gap.design.course import Course
-from chladni.gap.design.imitation import imitated
-from chladni.gap.design.rival import Rival
+from chladni.gap.design.rival import Rival, imitated
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError

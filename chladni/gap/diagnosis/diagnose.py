@@ -11,13 +11,17 @@ from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.diagnosis.advice import advice_on, measure_next
-from chladni.gap.diagnosis.any_law_beside import any_law
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
-from chladni.gap.diagnosis.correlation import correlation_of
-from chladni.gap.diagnosis.evidence import evidence
-from chladni.gap.diagnosis.explained_share import with_shares
+from chladni.gap.diagnosis.evidence import any_law, evidence
 from chladni.gap.diagnosis.joint_motions import JointMotions, joint_motions
-from chladni.gap.diagnosis.naming import causes_named, naive_of, ranking_of, tuned_numbers
+from chladni.gap.diagnosis.naming import (
+    causes_named,
+    correlation_of,
+    naive_of,
+    ranking_of,
+    tuned_numbers,
+    with_shares,
+)
 from chladni.gap.diagnosis.other_logs import tried_elsewhere
 from chladni.gap.diagnosis.remarks import remarks_on
 from chladni.gap.diagnosis.study import Study, study_of

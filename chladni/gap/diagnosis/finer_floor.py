@@ -1,15 +1,16 @@
-"""Noise as it shows behind the best cause, where the floor that was estimated without one may be too high."""
+"""Noise behind the best cause: where the floor is too high, and what in a residual follows its own signal."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.calibration import ALONE, LESS
+from chladni.gap.calibration import ALONE, LAW_POINTS, LESS, SOME
 from chladni.gap.comparison.noise_estimate import estimate_noise, smaller_floor
-from chladni.gap.diagnosis.own_signal import without_own_signal
 from chladni.gap.diagnosis.study import Study
+from chladni.gap.explanation.any_law import hats
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.noise_floor import NoiseFloor
+from chladni.signals.arrays import Real
 
 
 def finer_floor(study: Study, best: Contestant) -> NoiseFloor | None:
@@ -32,3 +33,44 @@ def finer_floor(study: Study, best: Contestant) -> NoiseFloor | None:
     lower = bool(np.any(finer.rms < LESS * noise.rms))
     more = bool(np.any(np.mean(left**2, axis=1) > ALONE * finer.rms**2))
     return finer if lower and more else None
+
+
+def share_of_own_signal(simulated: Real, residual: Real) -> Real:
+    """Share of each residual's power that a curve over what the sensor should show explains, but for straight lines.
+
+    A noise floor that comes from what no linear model explains holds a sensor's distortion and its steps too, and
+    nothing would ever stand out of it. What the signal itself explains is a gain's or a parameter's.
+
+    Parameters
+    ----------
+    simulated, residual
+        ``[output, sample]``.
+
+    Returns
+    -------
+    ``[output]`` 0 to 1.
+    """
+    found = np.zeros(len(simulated))
+    for row, (signal, left) in enumerate(zip(simulated, residual, strict=True)):
+        plain = _power(_rest([np.ones_like(signal), signal], left))
+        found[row] = 1.0 - _power(_rest(hats(signal, LAW_POINTS), left)) / plain if plain > 0 else 0.0
+    return found
+
+
+def without_own_signal(simulated: Real, residual: Real) -> Real:
+    """Give ``[output, sample]`` residuals without the curve over their own signal, where they follow one.
+
+    What is left of the others is as it was: a curve through noise would take some of that.
+    """
+    shares = share_of_own_signal(simulated, residual)
+    rows = zip(simulated, residual, shares, strict=True)
+    return np.stack([_rest(hats(signal, LAW_POINTS), left) if share > SOME else left for signal, left, share in rows])
+
+
+def _rest(functions: list[Real], target: Real) -> Real:
+    columns = np.stack(functions, axis=1)
+    return np.asarray(target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0])
+
+
+def _power(row: Real) -> float:
+    return float(row @ row)

@@ -8,7 +8,7 @@ import numpy as np
 from chladni.gap.calibration import FAR, FITS, PLACES
 from chladni.gap.diagnosis.study import Study, recovered_states
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
-from chladni.gap.explanation.known_states import KnownStates
+from chladni.gap.explanation.known_effect import KnownStates
 from chladni.gap.explanation.shooting import Shooting, Shot
 from chladni.gap.location.locate import Located
 

@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.calibration import CLOSE, NAMED, UNWEIGHED
+from chladni.gap.calibration import CLOSE, NAMED, UNWEIGHED, ZERO
+from chladni.gap.diagnosis.closing import explained_power
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.hypothesis import Contestant
-from chladni.gap.records.diagnosis import Candidate, Cause, FittedNumber, Ranked
+from chladni.gap.plant.tunable import Tunables
+from chladni.gap.records.diagnosis import Candidate, Cause, Closing, Correlation, FittedNumber, Ranked
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.models.files.site_units import compiled_site_units, known_site, units_at
@@ -184,3 +186,47 @@ def _plain(
 
 def _unit(study: Study, name: str) -> str:
     return study.measurement.output_units[study.measurement.output_names.index(name)]
+
+
+def correlation_of(tunables: Tunables, fit: OutputErrorFit) -> Correlation | None:
+    """Correlate the errors of the tuned parameters, those that the fit's effects leave free with them.
+
+    ``r_ij = C_ij / sqrt(C_ii C_jj)`` with C the covariance of the logarithms over the tolerances, log and tolerances
+    taken together; to first order that of the values too.
+
+    Returns
+    -------
+    Correlation or None
+        None where nothing was tuned.
+    """
+    count = len(tunables.names)
+    if not np.any(fit.parameter_std):
+        return None
+    covariance = fit.covariance[:count, :count]
+    std = np.sqrt(np.maximum(np.diag(covariance), ZERO))
+    matrix = np.clip(covariance / std[:, None] / std, -1.0, 1.0)
+    np.fill_diagonal(matrix, 1.0)
+    return Correlation(names=tunables.names, matrix=matrix)
+
+
+def with_shares(causes: Causes, said: Sequence[Cause], gap: Closing) -> tuple[Cause, ...]:
+    """Give the causes that a verdict names with their shares of the gap; see `Cause`.
+
+    One cause has all that is explained. Of several each has what comes back when only the others are named, by the
+    best fit of those; without such a fit nothing tells.
+    """
+    return tuple(replace(one, share=_share(causes, one, gap)) for one in said)
+
+
+def _share(causes: Causes, cause: Cause, gap: Closing) -> float | None:
+    if causes.shaken is not None:
+        return gap.explained
+    candidate, named = Candidate(effect=cause.effect, site=cause.site), set(causes.best.hypothesis.named)
+    # A sensor's steps were told by what it reads, not by a fit.
+    if gap.explained is None or candidate not in named:
+        return None
+    others = named - {candidate}
+    if not others:
+        return gap.explained
+    left = next((one.gap for one in causes.ranked if set(one.hypothesis.named) == others), None)
+    return None if left is None else explained_power(left, gap.tuned, gap.after, noise=gap.noise)

@@ -7,10 +7,9 @@ import numpy as np
 from chladni.gap.calibration import ALIKE, ALONE, BEGUN, CAUSES, FITS, FORMS, LEADS, PAIR_GAIN, PLACES, SAME
 from chladni.gap.comparison.whitening import with_law_error
 from chladni.gap.diagnosis.following import Entered, followed, is_lost_beside
-from chladni.gap.diagnosis.plausible import least_left, near_places, sound
+from chladni.gap.diagnosis.plausible import is_another, least_left, near_places, sound
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.candidates import Form, forms_at, promised, screened, searched
-from chladni.gap.explanation.degenerate import is_another
 from chladni.gap.explanation.hypotheses import effect_hypotheses, hypothesis_of, little_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.known_effect import KnownEffect

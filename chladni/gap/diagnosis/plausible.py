@@ -7,10 +7,14 @@ import numpy as np
 from chladni.gap.calibration import FAR, NEAR, ONE_FORCE, SAME
 from chladni.gap.diagnosis.following import is_lost_beside
 from chladni.gap.diagnosis.study import Study
-from chladni.gap.explanation.degenerate import is_degenerate
 from chladni.gap.explanation.hypothesis import Contestant
+from chladni.gap.explanation.trial import excited_band_hz
 from chladni.gap.location.locate import Located, Location
+from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.side_by_side import side_by_side
+from chladni.models.effects.attached_effect import AttachedEffect
+from chladni.models.effects.clues import FittedForm
+from chladni.signals.errors import ModelError
 
 
 def is_one_force(location: Location) -> bool:
@@ -77,3 +81,27 @@ def _is_possible(study: Study, one: Contestant) -> bool:
         for effect in one.fit.effects
         if effect.kind.clues.possible is not None and effect.site in recorded
     )
+
+
+def is_degenerate(run: FreeRun, found: Contestant) -> bool:
+    """Whether an effect of a fitted hypothesis does what a parameter or another effect does."""
+    return any(is_another(run, found, effect) for effect in found.fit.effects)
+
+
+def is_another(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool:
+    """Whether one effect of a fit does what a parameter or another effect does."""
+    judge = effect.kind.clues.is_degenerate
+    if judge is None:
+        return False
+    fitted = FittedForm(
+        variant=effect.variant,
+        values=effect.values,
+        duration_s=run.measurement.duration_s,
+        band_hz=excited_band_hz(run.measurement),
+        motion=lambda: run.law_motion(found.fit.z, found.fit.effects, found.fit.initial, site=effect.site),
+    )
+    try:
+        return judge(fitted)
+    except ModelError:
+        # A run that diverges shows no law at work.
+        return True

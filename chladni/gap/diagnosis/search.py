@@ -30,18 +30,18 @@ from chladni.gap.explanation.hypotheses import (
     effect_hypotheses,
     polished,
     siblings,
+    sticking_hypotheses,
     twins,
 )
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.linear_words import linear_beside, linear_elsewhere, linear_hypotheses
 from chladni.gap.explanation.screen import Screened
-from chladni.gap.explanation.sticking import sticking_hypotheses
 from chladni.gap.explanation.wrong_values import with_wrong_values, wrong_values
 from chladni.gap.location.locate import Located
 from chladni.signals.errors import EstimateError
 
 if TYPE_CHECKING:
-    from chladni.gap.explanation.known_states import KnownStates
+    from chladni.gap.explanation.known_effect import KnownStates
 
 Step = Callable[[float], None]
 

@@ -12,7 +12,7 @@ from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.comparison.whitening import quiet_floor
 from chladni.gap.diagnosis.told_holds import with_told_holds
 from chladni.gap.explanation.contest import Contest, training_mask
-from chladni.gap.explanation.known_states import KnownStates
+from chladni.gap.explanation.known_effect import KnownStates
 from chladni.gap.location.locate import Located, Location, locate
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.free_run import FreeRun

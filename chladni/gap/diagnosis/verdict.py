@@ -5,11 +5,10 @@ from dataclasses import dataclass, field
 
 from chladni.gap.calibration import NAMED, SOME
 from chladni.gap.diagnosis.belief import Belief
-from chladni.gap.diagnosis.finer_floor import finer_floor
-from chladni.gap.diagnosis.own_signal import share_of_own_signal
+from chladni.gap.diagnosis.finer_floor import finer_floor, share_of_own_signal
 from chladni.gap.diagnosis.plausible import is_lost
 from chladni.gap.diagnosis.search import Search
-from chladni.gap.diagnosis.shaken_by import ShakenGround, shaken_by
+from chladni.gap.diagnosis.shaken_ground import ShakenGround, shaken_by
 from chladni.gap.diagnosis.study import Study, over_floor, over_model, over_windows, step_error
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.location.locate import Located

@@ -8,7 +8,6 @@ from scipy.ndimage import uniform_filter1d
 
 from chladni.gap.calibration import FILTER_SAMPLES, LAW_POINTS, LINES_APART, PACE_POINTS, RIDGE, TONE_LINES, ZERO
 from chladni.gap.explanation.followed import followed
-from chladni.gap.explanation.hats import hats
 from chladni.gap.explanation.screen import Screen
 from chladni.gap.explanation.trial import SiteTrial
 from chladni.gap.location.locate import Located, Location
@@ -89,3 +88,12 @@ def _force(motion: Recovered, parts: list[Real]) -> Force:
 def _trial(site: Site, force: Force) -> SiteTrial:
     form = Trial(build=lambda _: force, values=lambda *_: {}, parameters=len(force.basis))
     return SiteTrial(site=site, form=form)
+
+
+def hats(signal: Real, count: int) -> list[Real]:
+    """Give hat functions of a signal ``[sample]``, one for each of `count` points with equally many samples between.
+
+    Points that coincide, of a signal that rests, count once. The functions add up to one.
+    """
+    points = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, count)))
+    return [np.interp(signal, points, one) for one in np.eye(points.size)]

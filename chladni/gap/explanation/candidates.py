@@ -5,11 +5,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from chladni.gap.calibration import FAR, HOPELESS, MANY, PLACES
-from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.followed import followed
 from chladni.gap.explanation.known_effect import KnownEffect
 from chladni.gap.explanation.screen import Screen, Screened
-from chladni.gap.explanation.trial import trials_at
+from chladni.gap.explanation.trial import excited_band_hz, trials_at
 from chladni.gap.location.locate import Located, Location, sites_at
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.places import Site

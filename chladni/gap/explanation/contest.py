@@ -11,7 +11,7 @@ from chladni.gap.calibration import BLOCK_S, EFFECTIVE_SAMPLES, FEWEST, ITERATIO
 from chladni.gap.comparison.shares import pooled_gap
 from chladni.gap.explanation.evidence import Left, doubt_of, freedom_nats, left_of
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
-from chladni.gap.explanation.known_states import KnownStates
+from chladni.gap.explanation.known_effect import KnownStates
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.side_by_side import side_by_side

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from chladni.gap.calibration import GAINED, PROFILE_STEPS, SHORTER
-from chladni.gap.explanation.held_site import HeldSite
-from chladni.gap.explanation.screen import Screen, Screened
+from chladni.gap.explanation.screen import HeldSite, Screen, Screened
 from chladni.gap.location.profile import Profile
 from chladni.signals.arrays import Real
 

@@ -1,20 +1,24 @@
 """From screened trials and wide parameters to hypotheses that are worth a fit."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.calibration import LEADS, LITTLE, TIED, UNLIKELY
-from chladni.gap.explanation.excited_band import excited_band_hz
+from chladni.gap.calibration import CREEP, FAR, LEADS, LITTLE, PLACES, TIED, UNLIKELY
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
 from chladni.gap.explanation.screen import Screened
+from chladni.gap.explanation.trial import excited_band_hz
+from chladni.gap.location.locate import Located, Location
+from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.free_run import FreeRun
-from chladni.gap.plant.places import Place
+from chladni.gap.plant.places import Place, Site
 from chladni.gap.tuning.output_error import OutputErrorFit
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.attached_effect import AttachedEffect, attached_if_possible
 from chladni.models.effects.clues import FittedForm
+from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.effects.trial import Numbers
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
@@ -151,3 +155,36 @@ def polished(coarse: Hypothesis, fit: OutputErrorFit) -> Hypothesis | None:
 
 def _inside(parameter: Parameter) -> float:
     return float(np.clip(parameter.value, parameter.minimum, parameter.maximum))
+
+
+def sticking_hypotheses(location: Location, kinds: Iterable[EffectKind]) -> list[Hypothesis]:
+    """Give friction at the joints where the cause may be, as large as most of the force that they pass on.
+
+    Of a joint that sticks sensors tell the whole force, friction with spring and damper: what they miss of the way
+    goes to the one as it comes from the other.
+    """
+    joints = list(_joints(location))[:PLACES]
+    resisting = [(kind, kind.clues.resisting) for kind in kinds if kind.clues.resisting is not None]
+    found = [_sticking(location, *joint, *friction) for friction in resisting for joint in joints]
+    return [one for one in found if one is not None]
+
+
+def _joints(location: Location) -> Iterator[tuple[Located, Site]]:
+    enough = FAR * min((one.profile.chi for one in location.ranked), default=0.0)
+    for located in location.ranked:
+        if located.profile.forces and located.profile.chi < enough:
+            yield from ((located, site) for site in located.places[0].sites if site.kind == "joint")
+
+
+def _sticking(
+    location: Location, located: Located, site: Site, kind: EffectKind, resisting: Callable[[float, float], Numbers]
+) -> Hypothesis | None:
+    problem = location.problem
+    motion = recovered(problem, located.profile, site)
+    compiled = problem.view(motion.z).compiled
+    port = compiled.ports[compiled.port_index(site.name, "joint")]
+    passed = motion.force + port.stiffness * motion.displacement + port.damping * motion.velocity
+    # Sliding begins with most of the force.
+    force = float(np.quantile(np.abs(passed - np.median(passed)), 1 - LITTLE))
+    effect = attached_if_possible(kind, site.name, resisting(force, CREEP * float(np.std(motion.velocity))))
+    return None if effect is None else hypothesis_of((effect,), located.profile.z)

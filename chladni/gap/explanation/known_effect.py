@@ -1,13 +1,13 @@
-"""What an effect that is known already did beyond the linear model, while another one is looked for."""
+"""What is known while an effect is looked for: what another one did, and states that the machine went through."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
 
 from chladni.gap.location.recovered import Recovered
-from chladni.gap.plant.free_run import FreeRun
+from chladni.gap.plant.free_run import FreeRun, Windows
 from chladni.gap.plant.linear_view import LinearView
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import all_lines
@@ -121,3 +121,31 @@ def _only_laws(run: FreeRun, effects: tuple[AttachedEffect, ...]) -> bool:
     plain, bent = run.compiled(), run.compiled(None, effects)
     others = [field.name for field in fields(plain) if field.name != "laws"]
     return all(np.array_equal(getattr(plain, name), getattr(bent, name)) for name in others)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class KnownStates(Value):
+    """States of a whole record.
+
+    Attributes
+    ----------
+    names
+        Of the states.
+    values
+        ``[state, sample]``, but for their means, which no accelerometer tells.
+    """
+
+    names: tuple[str, ...]
+    values: Real
+
+    def __post_init__(self) -> None:
+        self._freeze()
+
+    def at_starts(self, windows: Windows, names: Sequence[str]) -> Real:
+        """``[window, state]`` of the named states at the windows' first samples; those that aren't known are zero."""
+        found = np.zeros((len(windows), len(names)))
+        first = [start for start, _ in windows]
+        for place, name in enumerate(names):
+            if name in self.names:
+                found[:, place] = self.values[self.names.index(name), first]
+        return found

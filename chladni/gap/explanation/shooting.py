@@ -13,7 +13,7 @@ from chladni.gap.calibration import PARTED
 from chladni.gap.comparison.whitening import with_law_error
 from chladni.gap.explanation.contest import Contest
 from chladni.gap.explanation.hypothesis import Contestant, Hypothesis
-from chladni.gap.explanation.known_states import KnownStates
+from chladni.gap.explanation.known_effect import KnownStates
 from chladni.gap.plant.free_run import FreeRun, Windows
 from chladni.gap.plant.windows import nested_windows, training_in_windows
 from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from chladni.gap.calibration import TAIL, ZERO
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
@@ -85,3 +86,13 @@ def trials_at(
     for kind in kinds:
         if site.kind in kind.sites:
             yield from (SiteTrial(kind=kind, site=site, form=form) for form in trials_of(kind, known))
+
+
+def excited_band_hz(measurement: Measurement) -> tuple[float, float]:
+    """Give the lowest and highest frequency of the band that holds 99 % of the outputs' power."""
+    signals = measurement.outputs / np.maximum(np.std(measurement.outputs, axis=1, keepdims=True), ZERO)
+    power = np.sum(np.abs(np.fft.rfft(signals - signals.mean(axis=1, keepdims=True), axis=1)) ** 2, axis=0)
+    total = np.cumsum(power) / max(float(power.sum()), ZERO)
+    low, high = np.searchsorted(total, (TAIL, 1 - TAIL))
+    step = measurement.sample_rate_hz / measurement.samples
+    return float(max(low, 1) * step), float(max(high, 2) * step)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.gap.diagnosis.closing import explained_power
-from chladni.gap.diagnosis.explained_share import with_shares
+from chladni.gap.diagnosis.naming import with_shares
 from chladni.gap.diagnosis.verdict import Causes
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.records.diagnosis import Cause

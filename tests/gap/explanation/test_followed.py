@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.explanation.excited_band import excited_band_hz
 from chladni.gap.explanation.followed import followed
-from chladni.gap.explanation.held_site import HeldSite
-from chladni.gap.explanation.screen import Screen
-from chladni.gap.explanation.trial import trials_at
+from chladni.gap.explanation.screen import HeldSite, Screen
+from chladni.gap.explanation.trial import excited_band_hz, trials_at
 from chladni.gap.location.profile import profile_at, profiled
 from chladni.gap.location.recovered import recovered
 from chladni.gap.plant.linear_problem import LinearProblem

@@ -6,7 +6,7 @@ import pytest
 from chladni.gap.explanation.candidates import screened
 from chladni.gap.explanation.contest import Contest, training_mask
 from chladni.gap.explanation.hypotheses import hypothesis_of
-from chladni.gap.explanation.known_effect import KnownEffect
+from chladni.gap.explanation.known_effect import KnownEffect, KnownStates
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.windows import training_in_windows
@@ -76,3 +76,9 @@ def test_a_sensor_s_mount_is_found_behind_a_spring(made) -> None:
     # Along the linear model's share of the motion the same law explains far less.
     blind = [one for one in screened(location, [place], WORDS) if one.trial.effect == "mounting_resonance"]
     assert found[0].misfit < 0.5 * blind[0].misfit
+
+
+def test_windows_begin_at_known_states_and_others_at_rest() -> None:
+    known = KnownStates(names=("x", "v"), values=np.array([[0.0, 1.0, 2.0, 3.0], [4.0, 5.0, 6.0, 7.0]]))
+    found = known.at_starts(((0, 2), (2, 4)), ("v", "filter", "x"))
+    np.testing.assert_array_equal(found, [[4.0, 0.0, 0.0], [6.0, 0.0, 2.0]])

@@ -4,8 +4,7 @@ import pytest
 
 import chladni
 from chladni.gap.diagnosis.study import study_of
-from chladni.gap.explanation.hypotheses import polished
-from chladni.gap.explanation.sticking import sticking_hypotheses
+from chladni.gap.explanation.hypotheses import polished, sticking_hypotheses
 from tests.gap.made_log import band_noise, chain, measured, three_bodies
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.gap.explanation.shaken_ground import predicted_by_others
+from chladni.gap.diagnosis.shaken_ground import predicted_by_others
 from chladni.gap.location.profile import profile_at
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site

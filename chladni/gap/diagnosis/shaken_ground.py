@@ -1,19 +1,24 @@
-"""When only a floor that shakes explains a gap."""
+"""A floor that shakes: when only it explains a gap, what each sensor tells of it, and how strong it is."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from chladni.gap.calibration import ALIKE, CLEARLY, LEFT_BY_LAW, MOST, SOME, TIED
+import numpy as np
+
+from chladni.gap.calibration import ALIKE, CLEARLY, LEFT_BY_LAW, MOST, RIDGE, SOME, TIED
 from chladni.gap.diagnosis.plausible import near_places
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.any_law import left_by_any_law
 from chladni.gap.explanation.contest import held_gap
-from chladni.gap.explanation.floor_motion import floor_motion
 from chladni.gap.explanation.hypothesis import Contestant
-from chladni.gap.explanation.shaken_ground import predicted_by_others
 from chladni.gap.location.locate import Located
+from chladni.gap.location.profile import Profile, profile_at
+from chladni.gap.location.recovered import recovered
+from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
+from chladni.gap.plant.record_lines import all_lines
 from chladni.gap.records.diagnosis import FittedNumber
+from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.arrays import Real
 
 #: Share of the gap that any law of a site's motion, or a filter of the inputs, must leave there.
@@ -88,3 +93,60 @@ def _follows(study: Study, located: Located) -> bool:
     """Whether any law of the motion at one of a place's sites, or of the inputs, would explain most."""
     sites = [site for site in located.places[0].sites if site.kind in _LEFT]
     return any(left_by_any_law(study.location, located, site) < _LEFT[site.kind] for site in sites)
+
+
+def floor_motion(problem: LinearProblem, ground: Site, z: Real, kind: EffectKind) -> Mapping[str, FittedNumber]:
+    """Give the numbers of an effect at the ground that the sensors tell, without a standard deviation.
+
+    Parameters
+    ----------
+    problem
+        Of the whole record.
+    ground
+        The site whose acceleration it is.
+    z
+        Parameters of the model, in units of their tolerance.
+    kind
+        An effect whose force follows nothing, see `Clues`; of another one nothing is told.
+    """
+    if kind.clues.of_force is None:
+        return {}
+    found = recovered(problem, profile_at(problem, (ground,), z), ground)
+    values = kind.clues.of_force(found.force, problem.measurement.sample_rate_hz)
+    unit = next(port.unit for port in problem.view(z).compiled.ports if port.kind == "ground")
+    # What it vanishes with is in the ground's unit, which may turn.
+    units = {name: unit if name in kind.neutral else kind.parameters[name].unit for name in values}
+    return {name: FittedNumber(value=value, std=None, unit=units[name]) for name, value in values.items()}
+
+
+def predicted_by_others(problem: LinearProblem, found: Profile) -> Real:
+    """Give ``[output, sample]``: what each sensor should have read if the force that all others tell acts.
+
+    The force is Wiener's estimate (Kay 1993, *Estimation theory*, section 12.7): the less it stands out of the noise
+    of the sensors that tell it, the less of that is believed. How strong it is around a line all sensors tell: where
+    the others hardly feel it, they couldn't tell that either.
+
+    Parameters
+    ----------
+    problem
+        Of the whole record, two sensors at least.
+    found
+        Profile of a force at one site.
+    """
+    measurement = problem.measurement
+    lines = all_lines(measurement.samples, measurement.sample_rate_hz)
+    whole = problem.on(lines)
+    view = whole.view(found.z)
+    pattern = whole.pattern(view, found.sites[0])[:, 0]
+    force = recovered(problem, found, found.sites[0])
+    linear = view.response(force.transient, ())
+    residual = ((whole.measured - linear) * whole.weight)[:, 0]
+    told, strength = pattern.conj() * residual, np.abs(pattern) ** 2
+    # All is told of none without noise.
+    believed = np.minimum(force.reliable, 1.0 - RIDGE)
+    total = strength.sum(axis=0)
+    over_noise = np.where(total > 0, believed / (1.0 - believed) / np.where(total > 0, total, 1.0), 0.0)
+    others = (told.sum(axis=0) - told) * over_noise / (1.0 + (total - strength) * over_noise)
+    predicted = linear[:, 0] + pattern / whole.weight[:, 0] * others
+    mean = measurement.outputs.mean(axis=1, keepdims=True)
+    return np.asarray(lines.signal(predicted[:, None])[:, 0] + mean, dtype=np.float64)
