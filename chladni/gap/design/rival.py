@@ -1,4 +1,4 @@
-"""A candidate in an experiment: what it predicts, how that moves with its parameters, and how near it comes to another."""
+"""A candidate in an experiment: what it predicts, how that moves with its numbers, and how near another comes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
