@@ -230,8 +230,9 @@ class Contest:
         place = self.within
         for term in terms:
             rows = self.rows(term) if term.takes else term.rows
-            found[list(rows), place : place + len(term.numbers)] = 1.0
-            place += len(term.numbers)
+            count = len(term.numbers)
+            found[list(rows), place : place + count] = [not one.is_exact for one in term.numbers]
+            place += count
         return found
 
     def _passing(self, terms: Sequence[Term], numbers: Real) -> Real:

@@ -200,7 +200,8 @@ def _transmission(one: MachineJoint, term: Term, values: Real, torques: Torques)
     found = {number.name: float(value) for number, value in zip(term.numbers, values, strict=True)}
     if term.form is not None:
         found[term.form.name] = term.form.value
-    rotor = max(found["inertia"], 0.0)
+    # The described rotor stays where it is.
+    rotor = max(found["inertia"] - one.joint.armature, 0.0)
     first = "gap" if term.word == "backlash" else "compliance"
     # Where the log has efforts its product with the rotor is told.
     gives = found[first] if first in found else found["both"] / rotor if rotor else 0.0

@@ -31,6 +31,8 @@ class Number:
         What it's usually about, before the log is seen, beside the nominal one.
     places
         Whether it only says where the law is: alone it's no sign of it.
+    is_exact
+        Whether its column is physics, beside numbers of a law that idealises.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Number:
     nominal: float = 0.0
     about: float = 0.0
     places: bool = False
+    is_exact: bool = False
 
 
 #: Of what a limit takes all is missing, within what servos' gains and filtered columns are off by: a form that needs

@@ -59,7 +59,10 @@ def _rotor(torques: Torques, row: int, joint: RobotJoint) -> Number:
     scale = usual(torques, row) / rms(torques.acceleration[row])
     # A motor has a rotor, here or in the description.
     least = 0.0 if joint.armature else LEAST_ROTOR * float(torques.need.inertia[joint.dof, joint.dof])
-    return Number(name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", scale=scale, least=least)
+    return Number(
+        name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", scale=scale, least=least,
+        nominal=joint.armature, is_exact=True,
+    )  # fmt: skip
 
 
 def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Real, number: Number) -> Iterator[Term]:
@@ -76,8 +79,8 @@ def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Re
         make = partial(_at_link, torques, row, ahead, loop_is_known=known)
         yield Term(word=word, site=joint.name, make=make, numbers=numbers, rows=rows, variant=AT_LINK, rare=True)
     yield Term(
-        word=word, site=joint.name, make=partial(_at_motor, torques, row, ahead), numbers=(number, rotor),
-        rows=(row,), variant=AT_MOTOR, rare=True,
+        word=word, site=joint.name, make=partial(_at_motor, torques, row, ahead), numbers=(rotor, number),
+        rows=(row,), variant=AT_MOTOR, rare=True, plainer="armature",
     )  # fmt: skip
 
 
@@ -100,7 +103,7 @@ def _at_loop(torques: Torques, row: int, ahead: Real) -> Real:
 def _at_motor(torques: Torques, row: int, ahead: Real) -> Real:
     rate = torques.coarse_rate(ahead)
     behind = torques.turned(row, -ahead, -rate, -torques.coarse_rate(rate))
-    return np.concatenate([behind[None], at_row(torques, row, torques.acceleration[row])[:, : len(behind)]])
+    return np.concatenate([at_row(torques, row, torques.acceleration[row])[:, : len(behind)], behind[None]])
 
 
 def _play(torques: Torques, row: int, joint: RobotJoint, passed: Real, soft: Number) -> Iterator[Term]:

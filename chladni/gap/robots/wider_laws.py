@@ -11,9 +11,11 @@ from chladni.gap.robots.term import Term
 
 
 def adds(contest: Contest, fit: Fit, place: int) -> bool:
-    """Whether what a law has beyond the plainer one is told, and is more than a detail that any right law leaves."""
+    """Whether what a law has beyond the plainer one is told, and is more than a detail that a right law leaves."""
     value, deviation = _last(fit, place)
-    return abs(value) > SIGMAS * deviation and _share(contest, fit, place, value) > OPEN
+    # Of physics nothing is left.
+    is_exact = all(one.is_exact for one in fit.terms[place].numbers[:-1])
+    return abs(value) > SIGMAS * deviation and (is_exact or _share(contest, fit, place, value) > OPEN)
 
 
 def not_told_apart(contest: Contest, best: Fit, place: int) -> Iterator[tuple[Term, float]]:
@@ -24,7 +26,8 @@ def not_told_apart(contest: Contest, best: Fit, place: int) -> Iterator[tuple[Te
     """
     term = best.terms[place]
     rest = [*best.terms[:place], *best.terms[place + 1 :]]
-    laws = [_alike(one, term) for one in contest.terms if one.holds(term)]
+    # What few machines have isn't as likely as what most have.
+    laws = [_alike(one, term) for one in contest.terms if one.holds(term) and one.rare == term.rare]
     found: dict[str, tuple[Contest, Fit]] = {}
     for wider in {(one.word, one.variant, str(one.form_value)): one for one in laws}.values():
         small = contest if wider in contest.terms else contest.narrowed(rest).joined(wider)

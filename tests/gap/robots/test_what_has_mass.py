@@ -1,0 +1,45 @@
+"""What has mass: it turns noise of positions into torque, and is physics beside laws that idealise."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.solved import solved
+from chladni.gap.robots.torques import torques_of
+from chladni.gap.robots.transmission_words import AT_MOTOR
+from chladni.robots.machine import as_described
+from tests.robots.machines import arm, changed, commands, course, joint_log_of
+
+pytest.importorskip("mujoco")
+
+
+def test_what_was_found_to_be_heavier_turns_noise_of_positions_into_more_torque(tmp_path: Path) -> None:
+    robot, heavy = arm(tmp_path), arm(tmp_path, "heavy.xml", mass="4")
+    command = commands(8.0)
+    position = course(as_described(heavy), command)
+    position += 5e-4 * np.random.default_rng(0).standard_normal(position.shape)
+    log = joint_log_of(robot, position, command=command)
+    described, known = torques_of(robot, log), torques_of(heavy, log)
+    assert known.sensed_noise[0] > 1.3 * described.sensed_noise[0]
+    # A law may explain noise beyond what is believed of it.
+    found = solved(described, frozenset(), lambda _: None)
+    assert len(found.best.terms) == 1
+    assert found.torques.sensed_noise == pytest.approx(known.sensed_noise, rel=0.05)
+    assert np.all(found.torques.noise >= found.torques.sensed_noise)
+
+
+def test_a_motor_that_does_not_yield_explains_no_more_than_its_rotor(tmp_path: Path) -> None:
+    robot, command = arm(tmp_path), commands(8.0)
+    position = course(changed(as_described(robot), 0, armature=0.6), command)
+    position += 2e-4 * np.random.default_rng(0).standard_normal(position.shape)
+    contest = Contest(torques_of(robot, joint_log_of(robot, position, command=command)))
+    rotor, elastic = (
+        next(one for one in contest.terms if one.key == (word, "shoulder") and one.variant == variant)
+        for word, variant in (("armature", None), ("joint_elasticity", AT_MOTOR))
+    )
+    plain, wider = contest.fit([rotor]), contest.fit([elastic])
+    # What has mass is physics, of which a right description leaves nothing.
+    assert wider.left.log_likelihood.sum() < plain.left.log_likelihood.sum() + 1.0
+    assert wider.nats < plain.nats - 4.0
