@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.gap.calibration import DOUBTED, FAR, ROUNDING, SLIGHT, SMOOTH, ZERO
+from chladni.gap.calibration import DOUBTED, FAR, RIDGE, ROUNDING, SLIGHT, SMOOTH, ZERO
 from chladni.gap.location.profile import Profile, Projection
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.linear_view import View, Way
@@ -159,6 +159,8 @@ def _unknowns(
         power, reliable = np.array([one[0] for one in shown]).T, shown[0][1]
         # The quietest view of the noise is that from where the fewest forces can hide it.
         noise = np.min([one[2] for one in shown], axis=0)
+        # Where two patterns are one, forces beside each other could be of any size: noise is no less than rounding.
+        noise += RIDGE * np.sum(power * np.sum(np.abs(along) ** 2, axis=2), axis=1)
         covariance = (reach * power[:, None]) @ along.conj() + noise[:, None, None] * np.eye(len(residual))
         weight = np.linalg.inv(covariance)
         # What forces and transients could both print goes to whichever needs less of itself for it.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.gap.location.profile import profiled
-from chladni.gap.location.recovered import recovered
+from chladni.gap.location.recovered import _unknowns, recovered
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
@@ -81,3 +81,14 @@ def test_of_a_sensor_the_signal_is_what_the_model_shows_however_loud_its_noise_i
     site = Site(name="a0", kind="output")
     found = recovered(problem, profiled(problem, (site,), np.zeros(len(problem.tunables.names))), site)
     assert np.std(found.displacement - log.outputs[0]) < 0.03 * np.std(log.outputs[0])
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-12, 1e-9])
+def test_where_two_forces_print_one_pattern_their_covariance_has_an_inverse(apart: float) -> None:
+    # Of a joint and the ground beside it, driven by a pulse, each beside the other could be of any size.
+    rng = np.random.default_rng(0)
+    first, other, residual = (rng.standard_normal((3, 60)) + 1j * rng.standard_normal((3, 60)) for _ in range(3))
+    transients = rng.standard_normal((2, 3, 60)) + 0j
+    found = _unknowns([first, first + apart * other], residual, transients, np.zeros((2, 1)), np.zeros((2, 2)))
+    assert np.all(np.isfinite(found.force))
+    assert np.all(np.isfinite(found.transient))
