@@ -310,7 +310,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
         if one.terms[-1].word in words and one.terms[-1] in near
     )
     # Where the log leaves open whether a law needs more, it's either word.
-    open_laws = dict(not_told_apart(contest, best, place))
+    open_laws = {fit.terms[-1]: nats for fit, nats in not_told_apart(contest, best, place)}
     named = float(weight[0]) + same
     wider = named * sum(float(np.exp(nats / TEMPER)) for nats in open_laws.values())
     near += [one for one, nats in open_laws.items() if nats > -CLOSE]

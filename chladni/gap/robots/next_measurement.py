@@ -17,6 +17,7 @@ from chladni.gap.robots.joint_noise import steps_and_noise
 from chladni.gap.robots.search import alternatives
 from chladni.gap.robots.term import Term
 from chladni.gap.robots.torques import FormKey, Torques
+from chladni.gap.robots.wider_laws import not_told_apart
 from chladni.gap.robots.words import ROBOT_WORDS, all_terms
 from chladni.models.effects.catalogue import spoken_effect
 from chladni.robots.excite import random_motion
@@ -102,6 +103,8 @@ class Doubt:
         The same in words.
     beside
         Word and site of what the log leaves close, too.
+    now
+        Nats between them.
     """
 
     one: Fit
@@ -109,16 +112,12 @@ class Doubt:
     terms: tuple[Term, Term | None]
     names: tuple[Candidate, Candidate | None]
     beside: Beside
+    now: float
 
     @property
     def rows(self) -> tuple[int, ...]:
         """Of joints whose laws they say differently."""
         return tuple(dict.fromkeys(row for term in self.terms if term is not None for row in term.rows))
-
-    @property
-    def now(self) -> float:
-        """Nats between them."""
-        return max(self.one.nats - self.other.nats, 0.0)
 
 
 def next_measurement(
@@ -164,16 +163,19 @@ def _doubt(contest: Contest, best: Fit, place: int, name: Candidate) -> Doubt | 
     """Give what comes nearest in place of a term, where it comes close."""
     term = best.terms[place]
     without, *others = alternatives(contest, best, place, _RIVALS)
-    # Another form of the law, and one that holds it as a special case, say the same.
+    # Another form of the law says the same, and one that holds it as a special case where its number is told.
     rivals = [without, *(one for one in others if one.terms[-1].key != term.key and not one.terms[-1].holds(term))]
-    close = sorted((one for one in rivals if one.nats > best.nats - CLOSE), key=lambda one: -one.nats)
+    behind = [(max(best.nats - one.nats, 0.0), one) for one in rivals]
+    behind += [(max(-nats, 0.0), one) for one, nats in not_told_apart(contest, best, place)]
+    close = sorted((one for one in behind if one[0] < CLOSE), key=lambda one: one[0])
     if not close:
         return None
-    rival = None if close[0] is without else close[0].terms[-1]
+    now, other = close[0]
+    rival = None if other is without else other.terms[-1]
     return Doubt(
-        one=best, other=close[0], terms=(term, rival),
+        one=best, other=other, terms=(term, rival), now=now,
         names=(name, None if rival is None else Candidate(effect=rival.word, site=rival.site)),
-        beside=frozenset(one.terms[-1].key for one in close[1:] if one is not without),
+        beside=frozenset(one.terms[-1].key for _, one in close[1:] if one is not without),
     )  # fmt: skip
 
 
@@ -232,8 +234,9 @@ def _apart(contest: Contest, doubt: Doubt, motion: Motion) -> float | None:
     torques = contest.torques
     robot = replace(torques.robot, model=loaded(torques.robot.model, motion.payload))
     one, other = doubt.terms
-    # What isn't there is no more than simpler, whatever moves.
-    truths = [(doubt.one, one, other), *([] if other is None else [(doubt.other, other, one)])]
+    # What isn't there is no more than simpler, whatever moves; so is a law beside one that holds it.
+    truths = [] if other is not None and other.holds(one) else [(doubt.one, one, other)]
+    truths += [] if other is None else [(doubt.other, other, one)]
     try:
         made = motion.made(robot, min(torques.log.sample_rate_hz, _MOST_HZ))
         # What laws aren't linear in stays as it was found.

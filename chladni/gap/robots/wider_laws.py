@@ -18,8 +18,8 @@ def adds(contest: Contest, fit: Fit, place: int) -> bool:
     return abs(value) > SIGMAS * deviation and (is_exact or _share(contest, fit, place, value) > OPEN)
 
 
-def not_told_apart(contest: Contest, best: Fit, place: int) -> Iterator[tuple[Term, float]]:
-    """Give laws that hold a term and whose further number the log neither tells nor excludes, and their evidence.
+def not_told_apart(contest: Contest, best: Fit, place: int) -> Iterator[tuple[Fit, float]]:
+    """Fit laws that hold a term and whose further number the log neither tells nor excludes, and give their evidence.
 
     That number stays about as it was believed before, and may make a part of the law's force that matters. As either
     word is one thing at that joint, evidence counts alone, over that of the term, nats.
@@ -38,7 +38,7 @@ def not_told_apart(contest: Contest, best: Fit, place: int) -> Iterator[tuple[Te
         value, deviation = _last(fit, -1)
         is_open = MOST * fit.terms[-1].numbers[-1].scale < deviation and abs(value) < SIGMAS * deviation
         if is_open and _share(small, fit, -1, abs(value) + SIGMAS * deviation) > OPEN:
-            yield fit.terms[-1], fit.nats - contest.prior.nats(fit.terms) - best.nats + contest.prior.nats(best.terms)
+            yield fit, fit.nats - contest.prior.nats(fit.terms) - best.nats + contest.prior.nats(best.terms)
 
 
 def _alike(wider: Term, term: Term) -> Term:

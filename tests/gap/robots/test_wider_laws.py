@@ -9,6 +9,8 @@ import pytest
 from chladni.gap.records.diagnosis import Candidate
 from chladni.gap.robots.answer import Answer, Weighed
 from chladni.gap.robots.contest import Contest
+from chladni.gap.robots.fit import Fit
+from chladni.gap.robots.next_measurement import next_measurement
 from chladni.gap.robots.solved import Solved
 from chladni.gap.robots.torques import torques_of
 from chladni.robots.machine import Machine, as_described
@@ -20,14 +22,25 @@ RUBS = 4.0
 COULOMB, LOAD, STRIBECK = "coulomb_friction", "load_friction", "stribeck_friction"
 
 
-def weighed(folder: Path, change: Callable[[Machine], Machine], command: np.ndarray, word: str) -> Weighed:
-    """What is said of a word at the shoulder of a machine, by a log with some noise."""
+def contest_of(
+    folder: Path, change: Callable[[Machine], Machine], command: np.ndarray, *words: str
+) -> tuple[Contest, Fit]:
+    """Words of friction at the shoulder of a machine, by a log with some noise, and the best fit of the first."""
     robot = arm(folder)
     position = course(change(as_described(robot)), command)
     position += 2e-4 * np.random.default_rng(0).standard_normal(position.shape)
-    contest = Contest(torques_of(robot, joint_log_of(robot, position, command=command)))
-    fits = [contest.fit([term]) for term in contest.terms if term.key == (word, "shoulder") and not term.variant]
-    (one,) = Answer(solved=Solved(contest=contest, best=max(fits, key=lambda fit: fit.nats))).weighed
+    torques = torques_of(robot, joint_log_of(robot, position, command=command))
+    every = Contest(torques)
+    contest = Contest(torques, terms=[one for one in every.terms if one.word in words]) if words[1:] else every
+    keys = (words[0], "shoulder")
+    fits = [contest.fit([term]) for term in contest.terms if term.key == keys and not term.variant]
+    return contest, max(fits, key=lambda fit: fit.nats)
+
+
+def weighed(folder: Path, change: Callable[[Machine], Machine], command: np.ndarray, word: str) -> Weighed:
+    """What is said of a word there."""
+    contest, best = contest_of(folder, change, command, word)
+    (one,) = Answer(solved=Solved(contest=contest, best=best)).weighed
     return one
 
 
@@ -46,6 +59,12 @@ def test_friction_under_a_load_that_hardly_changes_is_either_word(tmp_path: Path
     assert Candidate(effect=LOAD, site="shoulder") in one.others
     # Both words are about as likely, each form of one as that of the other.
     assert 0.35 * one.of_any_law < one.probability < 0.6 * one.of_any_law
+
+
+def test_a_motion_is_looked_for_that_tells_which(tmp_path: Path) -> None:
+    contest, best = contest_of(tmp_path, rubbing, bent(0.05), COULOMB, LOAD)
+    said = next_measurement(contest, best, [(0, Candidate(effect=COULOMB, site="shoulder"), 1.0)], [])
+    assert (said or "").startswith("To tell Coulomb friction from load friction at shoulder, move ")
 
 
 def test_a_load_that_changes_tells_the_words_apart(tmp_path: Path) -> None:
