@@ -119,16 +119,6 @@ def model_of(machine: Machine, names: Sequence[str]) -> Any:
     return model
 
 
-def inertia_of(machine: Machine, position: Real) -> Real:
-    """Give ``[dof, dof]``: joint-space inertia of links with rotors, RMS over some poses of ``[dof, sample]``."""
-    model = copy(machine.robot.model)
-    _set_inertials(model, machine)
-    for one in machine.joints:
-        behind = 0.0 if one.transmission is None else one.transmission.inertia
-        model.dof_armature[one.joint.dof] += one.armature + behind - one.joint.armature
-    return inertia_rms(model, position)
-
-
 def _coupled(machine: Machine) -> Any:
     """Compile the description anew with tendons, which rub and pull as gears and cables of two joints do."""
     import mujoco

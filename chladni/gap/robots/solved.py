@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from chladni.gap.calibration import SAME
-from chladni.gap.records.diagnosis import PARAMETER
 from chladni.gap.robots.contest import Contest
 from chladni.gap.robots.fit import Fit
 from chladni.gap.robots.forms import Forms, refined
-from chladni.gap.robots.forward import machine_of
 from chladni.gap.robots.gains import Gains, guessed_gains, unknown_gains, with_gains
 from chladni.gap.robots.payload_words import OF_THE_LOG
 from chladni.gap.robots.pushes import PUSHED, Push, paying, price, pushed, pushes_of
@@ -20,7 +18,6 @@ from chladni.gap.robots.term import Term
 from chladni.gap.robots.told import TOLD, Numbers
 from chladni.gap.robots.tolerances import LOOP_S
 from chladni.gap.robots.torques import ALL_COMMANDS, FormKey, Guesses, Torques
-from chladni.robots.mujoco_forward import inertia_of
 from chladni.signals.errors import ModelError
 
 #: Times that columns are made anew for what was found, until that moves by less than so many seconds and metres.
@@ -29,8 +26,6 @@ _SHIFTS, _SETTLED_S, _SETTLED_M = 5, 1e-4, 2e-3
 _TOLD_BY, _KEPT_BY = 2.0, 1.0
 #: Times that gains which nobody says are guessed anew, until they move by less.
 _GUESSES, _SETTLED_GAIN = 2, 0.05
-#: Words of what has mass.
-_HAS_MASS = ("armature", "payload", "joint_elasticity", "backlash", PARAMETER)
 #: Of a form: by how little it moves when it has settled.
 _SETTLED = 0.01
 
@@ -212,9 +207,7 @@ def _guesses(contest: Contest, fit: Fit, forms: Forms) -> Guesses:
             centres[term.site] = np.asarray(values[1:4] / values[0])
         elif term.word == "encoder_offset" and term.variant == OF_THE_LOG:
             offset[term.site] = float(values[0])
-    heavier = any(term.word in _HAS_MASS for term in fit.terms)
-    inertia = inertia_of(machine_of(contest, fit), torques.all_positions) if heavier else None
-    return Guesses(late_s=late, centre_m=centres, offset=offset, forms=forms, inertia=inertia)
+    return Guesses(late_s=late, centre_m=centres, offset=offset, forms=forms)
 
 
 def _placed_from(torques: Torques, link: str) -> float:
@@ -244,8 +237,7 @@ def _is_settled(before: Torques, after: Torques) -> bool:
 def _is_as_quiet(before: Torques, after: Torques) -> bool:
     if before.level is None or after.level is None:
         return False
-    noise, sensed = after.noise / before.noise, after.sensed_noise / before.sensed_noise
-    return bool(np.all(np.abs(2.0 * np.log([noise, sensed])) < np.log(SAME)))
+    return bool(np.all(np.abs(np.log(after.level / before.level)) < np.log(SAME)))
 
 
 def _logs(forms: Forms) -> dict[FormKey, float]:

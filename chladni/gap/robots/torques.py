@@ -56,15 +56,12 @@ class Guesses:
         What joints read too much, rad (m), by joint.
     forms
         Numbers of laws that were found between those of their grids.
-    inertia
-        ``[dof, dof]``: joint-space inertia with the masses and rotors that were found; as described when None.
     """
 
     late_s: Mapping[str, float] = field(default_factory=dict)
     centre_m: Mapping[str, Real] = field(default_factory=dict)
     offset: Mapping[str, float] = field(default_factory=dict)
     forms: Mapping[FormKey, float] = field(default_factory=dict)
-    inertia: Real | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -362,9 +359,7 @@ class Torques(Motion):
     def sensed_noise(self) -> Real:
         """``[row]``: standard deviation that the noise of sensors gives the missing torque."""
         dofs = [one.dof for one in self.joints]
-        # What was found to be heavier turns noise of positions into more torque.
-        inertia = self.need.inertia if self.guesses.inertia is None else self.guesses.inertia
-        inertia = inertia[np.ix_(dofs, dofs)]
+        inertia = self.need.inertia[np.ix_(dofs, dofs)]
         damping = np.array([one.damping for one in self.joints])
         by_position = not self.by_effort and self.log.command_kind == "position"
         kp, kd = (one * by_position for one in (self.kp, self.kd))
@@ -462,10 +457,9 @@ class Torques(Motion):
         object.__setattr__(other, "guesses", guesses)
         object.__setattr__(other, "explained", explained)
         # Made for other guesses.
-        for name in ("loop", "rest", "within", "sensed_noise", "highest_noise"):
+        for name in ("loop", "rest", "within"):
             vars(other).pop(name, None)
-        # The noise stays as low as it was said to be.
-        return other if self.level is None else other.with_level((self.noise / other.noise) ** 2)
+        return other
 
     def lacking(self, missing: Real) -> Self:
         """Give the same where ``[row, coarse]`` is missing."""
