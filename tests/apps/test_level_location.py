@@ -39,6 +39,7 @@ def run(files, **options):
         return locate_from_levels(logs, **{"force": FORCE, "sensors": SENSORS, "driving_point": "a0", **options})
 
 
+@pytest.mark.nightly
 def test_a_place_is_found_from_files(files):
     found = run(files)
     assert found.location.located is not None

@@ -125,6 +125,7 @@ def until(page: Any, done: Any) -> bool:
     return False
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_poles_are_clicked_in_the_browser_and_the_selection_is_kept(response: Any) -> None:
     picking = pick_modes(response)

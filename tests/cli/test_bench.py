@@ -20,6 +20,7 @@ from chladni.signals.errors import ModelError, SetupError
 PROGRAM = "import typer; from chladni.cli.bench import bench; typer.run(bench)"
 
 
+@pytest.mark.nightly
 def test_serves_this_computer_only_says_so_and_ends_with_ctrl_c() -> None:
     arguments = [sys.executable, "-u", "-c", PROGRAM, "pneumatic-motor", "--no-open"]
     with subprocess.Popen(

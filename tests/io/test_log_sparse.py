@@ -84,6 +84,7 @@ def test_all_topics_count_together(tmp_path: Path) -> None:
 
 
 # Fewer than SHORT messages between pauses are events, which have no grid.
+@pytest.mark.nightly
 @given(
     bursts=st.lists(
         st.tuples(st.integers(100, 20 * HOUR_NS // PERIOD_NS), st.integers(SHORT, 60)),

@@ -139,6 +139,7 @@ def test_parts_of_a_batch_give_what_the_batch_gives(
         assert json.dumps(log.info().to_json()) == json.dumps(told)
 
 
+@pytest.mark.nightly
 def test_fields_times_messages_take_bounded_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A few bytes a message name thousands of fields, of which each would be a column of NaN."""
     fields, messages = 1000, 1000

@@ -189,6 +189,7 @@ def test_every_value_of_any_file_has_its_line(pieces: list[tuple[str, str]]) -> 
         assert key.split()[0] in lines[places.line_of((key,)) - 1]
 
 
+@pytest.mark.nightly
 def test_what_many_mistakes_cost_is_bounded(tmp_path: Path) -> None:
     looked = 0
 

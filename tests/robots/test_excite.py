@@ -66,6 +66,7 @@ def test_velocity_and_acceleration_are_the_derivatives() -> None:
     np.testing.assert_allclose(series.basis(time_s)[1:], slope[:2], atol=1e-8)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("effort", "base_hz"), [(60.0, 0.1), *(pytest.param(one, 0.6, marks=pytest.mark.nightly) for one in (60.0, 12.0))]
 )

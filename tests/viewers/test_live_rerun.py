@@ -84,6 +84,7 @@ def test_a_recording_is_bounded_and_both_its_files_are_whole(tmp_path: Path) -> 
     assert max(last) == pytest.approx(600.0 - 1 / RATE_HZ)
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted as Linux lists them")
 def test_a_file_that_is_full_leaves_none_of_its_threads_behind(tmp_path: Path) -> None:
     target = RecordingFile(tmp_path / "a.rrd", keep_bytes=200_000)

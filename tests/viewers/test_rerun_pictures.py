@@ -66,6 +66,7 @@ def test_the_arrangement_is_ours(arm: HeadlessViewer) -> None:
     }
 
 
+@pytest.mark.nightly
 def test_names_that_try_to_break_the_viewer_do_not(tmp_path: Path) -> None:
     path = write_rrd(synthetic.hostile_study(), tmp_path / "hostile.rrd")
     with headless_viewer(path) as viewer:

@@ -55,6 +55,7 @@ def test_beside_another_cause_it_is_told_without_a_name() -> None:
     assert any("beside the model all the time" in one for one in answer.remarks)
 
 
+@pytest.mark.nightly
 def test_left_out_it_is_told_too() -> None:
     answer = found(log(constant=30.0), words={"gain_error"})
     assert answer.verdict == "none"

@@ -133,6 +133,7 @@ def test_what_was_found_is_simulated():
     assert np.all(np.abs(constants[:, 0]) < signals.noise_rms)
 
 
+@pytest.mark.nightly
 def test_where_the_gap_lies():
     where = of_friction()[0].where
     assert [channel.name for channel in where.channels] == ["place", "speed", "acc.x"]

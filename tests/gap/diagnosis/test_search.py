@@ -185,6 +185,7 @@ def test_a_wrong_hold_is_doubted_however_little_of_the_gap_it_leaves(monkeypatch
     assert search.study.model.compile().holds == ("zoh",)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("variant", "time_s"),
     [("first_order", 3e-4), pytest.param("second_order", 3e-4, marks=pytest.mark.nightly)],
@@ -209,6 +210,7 @@ def test_a_hold_that_was_told_beside_an_unknown_force_gives_way_to_one_that_a_ca
     assert search.belief.probability(*search.best.hypothesis.named) > 0.9
 
 
+@pytest.mark.nightly
 def test_a_delay_is_named_in_a_log_that_begins_in_motion() -> None:
     # The force of the first samples lies before the record, and an accelerometer beside it feels it at once.
     late = attached("delay", "shaker", {"delay": 0.003})

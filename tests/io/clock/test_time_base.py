@@ -214,6 +214,7 @@ def test_stamps_over_more_than_thirty_years_are_no_clock() -> None:
     assert base.samples == 70
 
 
+@pytest.mark.nightly
 def test_a_log_full_of_steps_back_is_no_clock() -> None:
     rng = np.random.default_rng(6)
     base = fit_time_base(stamps(rng.uniform(0, 1000, 20_000)))

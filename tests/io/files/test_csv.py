@@ -325,6 +325,7 @@ def test_thousands_that_are_set_apart_are_refused(tmp_path: Path, cell: str) -> 
         read_csv(file_of(tmp_path, f"a;b\n1;{cell}\n2;{cell}\n"), sample_rate_hz=1.0)
 
 
+@pytest.mark.nightly
 def test_a_table_of_thousands_of_columns(tmp_path: Path) -> None:
     names = [f"a long name of channel {number}" for number in range(4000)]
     row = ",".join(map(str, range(4000)))

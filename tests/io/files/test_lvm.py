@@ -193,6 +193,7 @@ def test_damaged_files_are_told_in_one_line(tmp_path: Path, change: object, matc
         read_lvm(path)
 
 
+@pytest.mark.nightly
 def test_wrong_bytes_never_crash(tmp_path: Path) -> None:
     path = lvm(tmp_path / "a.lvm", segment("0.005000", axis=np.arange(SAMPLES) / 200), segment("0.005000"))
     raw = path.read_bytes()

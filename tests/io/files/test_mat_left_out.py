@@ -222,6 +222,7 @@ def test_version_73_without_h5py_names_the_extra(tmp_path: Path, monkeypatch: py
         read_mat(tmp_path / "a.mat")
 
 
+@pytest.mark.nightly
 def test_wrong_bytes_in_version_73_never_crash(tmp_path: Path) -> None:
     hdf5(tmp_path / "a.mat", {"fs": 200.0, "x": SIGNAL, "s": {"t": "x", "c": [SIGNAL, "a"]}})
     raw = (tmp_path / "a.mat").read_bytes()

@@ -125,6 +125,7 @@ def peer_modes(series, near_hz, segment):
     return result.Fn, result.Xi, result.Phi.T
 
 
+@pytest.mark.nightly
 def test_another_program_finds_the_same_in_a_chain():
     truth = ModalTruth(
         frequency_hz=np.array([2.0, 3.1]), damping_ratio=np.full(2, 0.02), shapes=np.array([[1.0, 0.7], [0.7, -1.0]])

@@ -36,6 +36,7 @@ def test_the_least_answer_time_is_the_least_damping_and_mass() -> None:
     assert {one.name for one in best.before} == {one.name for one in best.after}
 
 
+@pytest.mark.nightly
 def test_an_overshoot_is_met_with_the_least_change() -> None:
     best = optimise(oscillator(), ["c"], overshoot_at_most(10.0), bounds={"c": (0.1, 4.0)})
     log = np.log(0.1)

@@ -189,6 +189,7 @@ def test_a_log_at_a_time(shared_data):
         assert "backward difference" in " ".join(fit.notes)
 
 
+@pytest.mark.nightly
 def test_fitted_on_two_currents_the_third_and_another_stroke_are_predicted(shared_data):
     fit = fit_mr_damper([measured(shared_data, name) for name in ("mr_0A", "mr_10mm_1A")], order=1, starts=1)
     assert 100 * mr_error(fit.coefficients, measured(shared_data, "mr_0.5A")).of_rms_force < 8.0

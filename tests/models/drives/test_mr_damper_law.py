@@ -39,7 +39,7 @@ def paper(x, v, t, law):
 
 def test_it_is_equation_5_of_the_paper():
     law = MEASURED_DAMPER.law(0.5)
-    t = np.linspace(0.0, 4.0, 801)
+    t = np.linspace(0.0, 2.0, 201)
     x, v = (lambda time: 0.02 * np.sin(np.pi * time)), (lambda time: 0.02 * np.pi * np.cos(np.pi * time))
     force, w, z = paper(x, v, t, law)
     ours = [

@@ -238,6 +238,7 @@ def test_influence_is_computed_when_one_looks(page: Any) -> None:
     assert page.get_by_text("strongest of its row").is_visible()
 
 
+@pytest.mark.nightly
 @needs_chromium
 def test_a_dropped_log_shows_beside_the_simulation_and_is_removed(page: Any, tmp_path: Path) -> None:
     page.get_by_role("button", name=VIEWS[3], exact=True).click()

@@ -69,6 +69,7 @@ def test_the_command_reads_a_log_of_this_kind(campaign):
     assert {channel["jitter_s"] for channel in told["channels"]} == {0.0}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "kind", [kind if kind == "none" else pytest.param(kind, marks=pytest.mark.nightly) for kind in KINDS]
 )
@@ -83,6 +84,7 @@ def test_the_same_three_give_the_same_case(kind):
     assert again.effects == case.effects
 
 
+@pytest.mark.nightly
 def test_other_indices_and_seeds_give_other_cases():
     case = drawn("none")
     for other in (draw_case(SEED, 99, "none"), draw_case(SEED + 1, KINDS.index("none") + 1, "none")):
