@@ -233,7 +233,8 @@ def _smooth_part(origin: Real, damped: float, width: float, derivatives: int) ->
     here, there = (2 * damped) ** 2 + width**2, (origin + damped) ** 2 + width**2
     away = 2 * (origin + damped) / there
     value = (origin / damped) ** (2 * derivatives) * here / there
-    by_origin = 2 * derivatives / origin - away
+    # Where omega is 0 the power doesn't change with it: it is 0, or has no such factor.
+    by_origin = 2 * derivatives * np.divide(1.0, origin, out=np.zeros_like(origin), where=origin != 0) - away
     by_damped = -2 * derivatives / damped + 8 * damped / here - away
     return value, by_origin, by_damped, 2 * width / here - 2 * width / there
 
