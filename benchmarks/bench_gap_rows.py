@@ -9,25 +9,26 @@ answer may weaken to `unknown`, or tell the wrong value beside the cause; it sho
 """
 
 import argparse
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 from scipy.signal import cont2discrete, dlsim
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import chladni
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.records.diagnosis import PARAMETER, Diagnosis
 from chladni.gap.records.measurement import Measurement
-from chladni.models.structures.structure import Body, Joint, Structure
-from chladni.models.structures.structure_input import StructureInput
-from chladni.models.structures.structure_model import StructureModel
-from chladni.models.structures.structure_output import StructureOutput
+from chladni.models.structures.structure_parameters import DEFAULT_TOLERANCE
+from tests.gap.made_log import RATE_HZ, chain
 
-RATE_HZ, SAMPLES, BEFORE = 1024.0, 4000, 500
-TOLERANCE = 0.05
+SAMPLES, BEFORE = 4000, 500
 #: How often the log's grid is divided, and what SciPy has between two instants of that.
 FOLLOWED = {"held": (1, "zoh"), "band-limited": (32, "foh")}
 HOLDS, NOISES = tuple(FOLLOWED), (0.003, 0.01)
@@ -38,27 +39,6 @@ CAUSES = (
     ("time_offset", "a2", {"offset": 1.5e-3}),
 )
 OFF = (0.0, 1.0, 5.0, 20.0)
-
-
-def chain(masses, stiffnesses, dampings) -> StructureModel:
-    """Bodies on joints from the ground on, driven at the last one, an accelerometer on each."""
-    places = range(len(masses))
-    return StructureModel(
-        name="chain",
-        structure=Structure(
-            bodies=tuple(Body(name=f"b{place}", mass=float(masses[place])) for place in places),
-            joints=tuple(
-                Joint(
-                    name=f"j{place}", between=("ground" if place == 0 else f"b{place - 1}", f"b{place}"),
-                    stiffness=float(stiffnesses[place]), damping=float(dampings[place]),
-                )
-                for place in places
-            ),
-        ),
-        inputs=(StructureInput(name="shaker", at=f"b{len(masses) - 1}"),),
-        outputs=tuple(StructureOutput(name=f"a{place}", measures="acceleration", at=f"b{place}") for place in places),
-        default_tolerance=TOLERANCE,
-    )  # fmt: skip
 
 
 def drawn(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -102,7 +82,7 @@ def log_of(inputs: np.ndarray, outputs: np.ndarray) -> Measurement:
     """The log that was written."""
     names = tuple(f"a{place}" for place in range(len(outputs)))
     return Measurement(
-        log="made", sample_rate_hz=RATE_HZ, inputs=inputs[None], outputs=outputs, input_names=("shaker",),
+        log="made", sample_rate_hz=RATE_HZ, inputs=inputs[None], outputs=outputs, input_names=("hammer",),
         output_names=names, output_units=("m/s^2",) * len(names),
     )  # fmt: skip
 
@@ -112,12 +92,12 @@ def sound(case: tuple[str, float, int]) -> tuple[str, str]:
     hold, noise, seed = case
     rng = np.random.default_rng([seed, HOLDS.index(hold), NOISES.index(noise)])
     nominal = drawn(rng)
-    real = [one * np.exp(TOLERANCE * rng.uniform(-1, 1, one.size)) for one in nominal]
+    real = [one * np.exp(DEFAULT_TOLERANCE * rng.uniform(-1, 1, one.size)) for one in nominal]
     finer, between = FOLLOWED[hold]
     fine = band_limited(finer, rng)
     outputs = accelerations(*real, fine, finer, between)
     log = log_of(fine[BEFORE * finer :: finer], noisy(outputs, noise, rng))
-    return f"{hold}, {noise:.1%}", answer(diagnose(chain(*nominal), [log]))
+    return f"{hold}, {noise:.1%}", answer(diagnose(chain(*nominal, at=nominal[0].size - 1), [log]))
 
 
 def beside_nominal(case: tuple[int, float]) -> tuple[str, float, Diagnosis]:
@@ -125,13 +105,13 @@ def beside_nominal(case: tuple[int, float]) -> tuple[str, float, Diagnosis]:
     word, site, values = CAUSES[case[0]]
     rng = np.random.default_rng(case[0])
     masses, stiffnesses, dampings = np.array([2.0, 2.5, 3.0]), np.array([5e5, 6e5, 4e5]), np.array([40.0, 60.0, 50.0])
-    machine = chain(masses, stiffnesses, dampings).with_effects((chladni.attached(word, site, values),))
+    machine = chain(masses, stiffnesses, dampings, at=2).with_effects((chladni.attached(word, site, values),))
     samples = band_limited(1, rng)
-    series = chladni.TimeSeries.from_arrays(samples[None], sample_rate_hz=RATE_HZ, names=["shaker"], units=["N"])
+    series = chladni.TimeSeries.from_arrays(samples[None], sample_rate_hz=RATE_HZ, names=["hammer"], units=["N"])
     outputs = chladni.simulate(machine, series).outputs.values
-    wrong = stiffnesses * np.exp(TOLERANCE * case[1] * np.array([0.0, 1.0, 0.0]))
+    wrong = stiffnesses * np.exp(DEFAULT_TOLERANCE * case[1] * np.array([0.0, 1.0, 0.0]))
     log = log_of(samples, noisy(outputs, 0.01, rng))
-    return f"{word} at {site}", case[1], diagnose(chain(masses, wrong, dampings), [log])
+    return f"{word} at {site}", case[1], diagnose(chain(masses, wrong, dampings, at=2), [log])
 
 
 def answer(found: Diagnosis) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from chladni.gap.calibration import CLOSE, COVERAGE, LAPSE, LEAST_SHARE, NAMED, TEMPER
+from chladni.gap.calibration import CLOSE, COVERAGE, LAPSE, LEAST_SHARE, NAMED, SIGMAS, TEMPER
 from chladni.gap.comparison.shares import band_shares, regime_shares, relative_residual
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.records.diagnosis import (
@@ -49,8 +49,6 @@ if TYPE_CHECKING:
 _OTHERS, _BLOCKS = 6, 16
 #: Samples that lie farther apart than so many intervals are of two stretches.
 _GAP = 1.5
-#: Deviations beyond which a number is told.
-_SIGMAS = 2.0
 #: Times the noise from which an error is clear of it.
 _CLEAR = 2.0
 #: Of the error without: what an answer leaves that simulation confirms.
@@ -292,7 +290,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
         *(
             one
             for one in found[1:]
-            if not one.terms[-1].holds(term) or (_adds(solved, one, -1) and one.nats > best.nats - TEMPER)
+            if not one.terms[-1].holds(term) or (adds(solved, one, -1) and one.nats > best.nats - TEMPER)
         ),
     ]
     # What is unknown elsewhere is so with the term, too.
@@ -339,15 +337,6 @@ def _weighed(solved: Solved, place: int) -> Weighed:
     )
 
 
-def _adds(solved: Solved, fit: Fit, place: int) -> bool:
-    """Whether what a law of a fit has beyond a plainer one is told."""
-    term = fit.terms[place]
-    if term.form is None or not term.adds_form:
-        return adds(solved.contest, fit, place)
-    spread = solved.spread.get((term.word, term.site, term.variant), term.form.high - term.form.low)
-    return term.form.value > _SIGMAS * spread
-
-
 def _told(best: Fit, place: int) -> Mask:
     """``[number]``: whether it's beyond its uncertainty, and not at the edge of what it can be.
 
@@ -357,7 +346,7 @@ def _told(best: Fit, place: int) -> Mask:
     term = best.terms[place]
     moved = values - term.nominal
     inside = (moved > term.least + 1e-3 * term.scale) | ((term.nominal > 0) & (term.least == -term.nominal))
-    return np.asarray((np.abs(moved) > _SIGMAS * deviations) & inside)
+    return np.asarray((np.abs(moved) > SIGMAS * deviations) & inside)
 
 
 def _candidate(solved: Solved, place: int) -> Candidate:
@@ -367,7 +356,7 @@ def _candidate(solved: Solved, place: int) -> Candidate:
     the description has is a wrong value of it.
     """
     term = solved.best.terms[place]
-    word = term.word if term.plainer is None or _adds(solved, solved.best, place) else term.plainer
+    word = term.word if term.plainer is None or adds(solved, solved.best, place) else term.plainer
     if word in _STATED and not term.is_coupling and solved.best.values(place)[0][0] < term.nominal[0]:
         return Candidate(effect=PARAMETER, site=f"{term.site}.{_STATED[word]}")
     return Candidate(effect=word, site=term.site)

@@ -4,18 +4,23 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from chladni.gap.calibration import MOST, OPEN, SIGMAS
+from chladni.gap.calibration import MOST, OPEN, SIGMAS, ZERO
 from chladni.gap.robots.contest import Contest
 from chladni.gap.robots.fit import Fit
+from chladni.gap.robots.solved import Solved
 from chladni.gap.robots.term import Term
 
 
-def adds(contest: Contest, fit: Fit, place: int) -> bool:
+def adds(solved: Solved, fit: Fit, place: int) -> bool:
     """Whether what a law has beyond the plainer one is told, and is more than a detail that a right law leaves."""
+    term = fit.terms[place]
+    if term.form is not None and term.adds_form:
+        spread = solved.spread.get((term.word, term.site, term.variant), term.form.high - term.form.low)
+        return term.form.value > SIGMAS * spread
     value, deviation = _last(fit, place)
     # Of physics nothing is left.
-    is_exact = all(one.is_exact for one in fit.terms[place].numbers[:-1])
-    return abs(value) > SIGMAS * deviation and (is_exact or _share(contest, fit, place, value) > OPEN)
+    is_exact = all(one.is_exact for one in term.numbers[:-1])
+    return abs(value) > SIGMAS * deviation and (is_exact or _share(solved.contest, fit, place, value) > OPEN)
 
 
 def not_told_apart(contest: Contest, best: Fit, place: int) -> Iterator[tuple[Fit, float]]:
@@ -60,4 +65,4 @@ def _share(contest: Contest, fit: Fit, place: int, value: float) -> float:
     whole, _ = fit.values(place % len(fit.terms))
     alone = np.zeros_like(whole)
     alone[-1] = value
-    return float(np.sqrt(contest.power(term, alone) / max(contest.power(term, whole), 1e-300)))
+    return float(np.sqrt(contest.power(term, alone) / max(contest.power(term, whole), ZERO)))
