@@ -38,7 +38,8 @@ def browser() -> Iterator[Any]:
 
 
 @needs_chromium
-@among(["robot-arm"])
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", INSTRUMENTS)
 def test_the_page_opens_without_complaint_and_a_knob_moves_its_curves(browser: Any, address: str, name: str) -> None:
     browser.complaints.clear()
     page = open_page(browser, address + name)

@@ -110,7 +110,7 @@ def test_what_is_ignored_stays_ignored(tmp_path: Path) -> None:
         (signal.SIGKILL, "parent"),
         pytest.param(signal.SIGTERM, "group", marks=pytest.mark.nightly),
         pytest.param(signal.SIGINT, "parent", marks=pytest.mark.nightly),
-        pytest.param(signal.SIGINT, "group", marks=pytest.mark.slow),
+        pytest.param(signal.SIGINT, "group", marks=pytest.mark.nightly),
     ],
 )
 def test_workers_end_with_their_parent(tmp_path: Path, number: signal.Signals, whom: str) -> None:

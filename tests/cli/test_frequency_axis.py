@@ -133,6 +133,7 @@ def test_fmax_is_the_upper_end_of_the_band(run: Run, log: Path) -> None:
     assert "--fmax 10 leaves no frequency; give one above 20 Hz" in refused.err
 
 
+@pytest.mark.nightly
 def test_functions_and_their_synthesis_are_drawn_in_the_unit_asked_for(run: Run, log: Path) -> None:
     found = modal_study(chladni.open(log))
     shown = found.drawn_in(["g"])

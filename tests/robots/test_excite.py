@@ -100,6 +100,7 @@ def test_rows_are_the_series_and_end_where_they_start(tmp_path: Path) -> None:
         np.testing.assert_allclose(rows[:, [0, -1]], 0.0, atol=1e-12)
 
 
+@pytest.mark.nightly
 def test_the_torque_makes_mujoco_accelerate_as_planned(tmp_path: Path) -> None:
     import mujoco
 

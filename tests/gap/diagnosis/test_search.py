@@ -171,6 +171,7 @@ def test_a_hold_is_told_behind_a_cause_that_hid_it() -> None:
     assert search.study.model.compile().holds == ("zoh",)
 
 
+@pytest.mark.nightly
 def test_a_wrong_hold_is_doubted_however_little_of_the_gap_it_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
     # No hold was told at first, and the search is closed: nothing is left that is worth the name of a cause.
     monkeypatch.setattr("chladni.gap.diagnosis.study.with_told_holds", lambda model, _: model)

@@ -51,6 +51,7 @@ def test_and_named() -> None:
     assert found.gap.closed > 0.99
 
 
+@pytest.mark.nightly
 def test_a_coupling_that_is_no_force_at_any_one_place_is_found_by_its_first_step() -> None:
     log = measured((chladni.attached("gyroscopic", "column~wrist", {"coefficient": 60.0}),))
     location = locate(arm(), log, estimate_noise(log), Tunables.of(arm()))

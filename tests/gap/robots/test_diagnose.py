@@ -171,6 +171,7 @@ def test_a_gap_is_not_bridged(tmp_path: Path) -> None:
     assert found.causes[0].parameters["force"].value == pytest.approx(2.0, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_any_log_that_is_long_enough_is_diagnosed(tmp_path: Path) -> None:
     robot, command = arm(tmp_path), commands(3.0)
     position = run_native(robot, command)

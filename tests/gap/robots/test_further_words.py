@@ -62,6 +62,7 @@ def test_elasticity_is_told_where_the_log_reads_the_motor(tmp_path: Path) -> Non
     assert found.causes[0].parameters["stiffness"].value == pytest.approx(400.0, rel=0.15)
 
 
+@pytest.mark.nightly
 def test_a_loop_that_yields_with_its_motor_is_held_to_no_limit(tmp_path: Path) -> None:
     # Where the link is, its loop would ask for twice as much as the drive can give, and as the motor was ever asked.
     robot, command = arm(tmp_path), commands(SECONDS)
@@ -84,6 +85,7 @@ def test_a_loop_that_yields_with_its_motor_is_held_to_no_limit(tmp_path: Path) -
     assert 1.0 / fit.values(0)[0][0] == pytest.approx(100.0, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_a_spring_over_two_joints_is_told_at_both(tmp_path: Path) -> None:
     robot, command = arm(tmp_path), commands(SECONDS)
     cable = Coupling(joints=("shoulder", "elbow"), ratio=0.7, stiffness=25.0, torque=2.0)
@@ -98,6 +100,7 @@ def test_a_spring_over_two_joints_is_told_at_both(tmp_path: Path) -> None:
     assert "times elbow, at rest at -" in headline(found)
 
 
+@pytest.mark.nightly
 def test_friction_that_changes_along_the_way_is_told_at_its_ends(tmp_path: Path) -> None:
     robot, command = arm(tmp_path), commands(SECONDS)
     rubs = Uneven(places=(-1.0, 0.0, 1.0), beyond=(3.0, 0.0, -3.0))

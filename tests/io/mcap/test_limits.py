@@ -50,7 +50,7 @@ def test_a_bomb_within_the_limit_of_its_lie(tmp_path: Path) -> None:
     assert "declares 200000000 bytes but 10000000 were found in it" in damage.what
 
 
-@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+@pytest.mark.parametrize("compression", [pytest.param("zstd", marks=pytest.mark.nightly), "lz4"])
 def test_a_chunk_is_decompressed_once_in_memory(tmp_path: Path, compression: str) -> None:
     size = 128 * MIB
     bomb = chunk_of_one_record(size, compression)

@@ -238,7 +238,7 @@ def windowed_responses(series, impacts, decay_per_s):
     return replace(series, values=values)
 
 
-@pytest.mark.parametrize("both", [True, False])
+@pytest.mark.parametrize("both", [pytest.param(True, marks=pytest.mark.nightly), False])
 def test_a_hammer_test_has_the_right_damping_after_the_correction_and_the_wrong_one_before(both):
     decay = 4.0
     off, wrong = [], []

@@ -22,6 +22,7 @@ from chladni.signals.errors import ModelError
 from tests.models.analysis.systems import FunctionModel, compiled, oscillator, parameter, pt2, state_space
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_least_answer_time_is_the_least_damping_and_mass() -> None:
     best = optimise(oscillator(), ["m", "c"], least_answer_time(), bounds={"m": (0.5, 2.0), "c": (0.1, 0.5)})

@@ -159,9 +159,9 @@ def test_seals_hold_the_piston_against_a_small_load():
     [
         (HYDRAULIC, {}, {"saturation": "on", "dead_zone": "on", "valve_lag": "on", "loop": "position"}, 2e4, 0.2,
          {"reference": 0.05}),
-        (SERVO, {"current_limit": 8.0, "voltage_limit": 24.0},
-         {"loop": "velocity", "voltage_limiter": "on", "current_limiter": "on", "converter_lag": "on"}, 2e4, 0.05,
-         {"velocity_reference": 150.0, "load_torque": 0.2}),
+        pytest.param(SERVO, {"current_limit": 8.0, "voltage_limit": 24.0},
+                     {"loop": "velocity", "voltage_limiter": "on", "current_limiter": "on", "converter_lag": "on"},
+                     2e4, 0.05, {"velocity_reference": 150.0, "load_torque": 0.2}, marks=pytest.mark.nightly),
     ],
 )  # fmt: skip
 def test_limits_in_loops_agree_with_scipy(kind, values, options, rate_hz, seconds, levels):

@@ -138,6 +138,7 @@ def test_loops_of_sliders_are_the_backbone_twice_as_large() -> None:
     np.testing.assert_allclose(back[0] - back[::2], 2 * there[:21], atol=0.01 * FORCE)
 
 
+@pytest.mark.nightly
 def test_along_a_known_motion_sliders_are_springs_that_are_cut_off() -> None:
     d = 3 * YIELD * np.sin(np.linspace(0, 20, 1001)) * np.linspace(0, 1, 1001)
     law = _sliders()

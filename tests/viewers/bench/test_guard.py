@@ -122,7 +122,7 @@ def test_what_puts_a_page_into_another_one_is_not_there(server: Any, port: int, 
     assert server.open_pages == 0
 
 
-@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("path", [PATHS[0], *(pytest.param(path, marks=pytest.mark.nightly) for path in PATHS[1:])])
 def test_every_answer_has_the_headers_that_keep_others_out(port: int, path: str) -> None:
     for line in ("Sec-Fetch-Site: none", "Sec-Fetch-Site: cross-site"):
         headers = wire.ask(port, path, line).headers
@@ -274,7 +274,7 @@ BUFFER = wire.frame(b'{"id": "a"}')
 @pytest.mark.parametrize(
     "frames",
     [
-        [wire.frame(LONG)],
+        pytest.param([wire.frame(LONG)], marks=pytest.mark.nightly),
         pytest.param([wire.frame(LONG, wire.BINARY)], marks=pytest.mark.nightly),
         pytest.param(
             [wire.frame(LONG[:500_000], last=False)] + [wire.frame(LONG[:500_000], 0, last=False)] * 5,
