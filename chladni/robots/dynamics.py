@@ -1,5 +1,6 @@
 """Inverse dynamics of a robot: the torque that a motion needs, and what each link's inertia adds to it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,13 +26,10 @@ class Needed(Value):
     regressor
         ``[dof, sample, link, 10]``: the torque is linear in a link's `INERTIAL` numbers (Atkeson, An & Hollerbach
         1986); per kg, kg m, kg m^2.
-    inertia
-        ``[dof, dof]``: the joint-space inertia, RMS over the poses, kg m^2 (kg).
     """
 
     torque: Real
     regressor: Real
-    inertia: Real
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -45,10 +43,32 @@ def needed_torque(robot: Robot, position: Real, velocity: Real, acceleration: Re
     position, velocity, acceleration
         ``[dof, sample]``, SI; of every degree of freedom of the robot in its order.
     """
-    from chladni.robots.mujoco_motion import inertia_rms, walk
+    from chladni.robots.mujoco_motion import walk
 
     torque, links = walk(robot.model, position, velocity, acceleration)
-    return Needed(torque=torque, regressor=_regressor(links), inertia=inertia_rms(robot.model, position))
+    return Needed(torque=torque, regressor=_regressor(links))
+
+
+def inertia_columns_of_links(robot: Robot, position: Real, dofs: Sequence[int]) -> Real:
+    """Give ``[link, 10, dof, dof, pose]``: joint-space inertia a unit of the links' `INERTIAL` numbers.
+
+    Parameters
+    ----------
+    position
+        ``[qpos, pose]``.
+    dofs
+        Degrees of freedom that are asked for.
+    """
+    from chladni.robots.mujoco_motion import walk, weightless
+
+    poses, count = position.shape[1], len(dofs)
+    # One acceleration after the other at each pose.
+    turned = np.zeros((robot.model.nv, count, poses))
+    turned[list(dofs), np.arange(count)] = 1.0
+    turned = turned.reshape(robot.model.nv, -1)
+    _, links = walk(weightless(robot.model), np.tile(position, count), np.zeros_like(turned), turned)
+    columns = _regressor(links)[list(dofs)].reshape(count, count, poses, -1, INERTIAL)
+    return np.ascontiguousarray(np.moveaxis(columns, (3, 4), (0, 1)))
 
 
 def motion_torque(robot: Robot, position: Real, velocity: Real, acceleration: Real) -> Real:

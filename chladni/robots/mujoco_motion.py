@@ -8,9 +8,6 @@ import numpy as np
 
 from chladni.signals.arrays import Real
 
-#: Poses at which the joint-space inertia is asked for.
-_POSES = 16
-
 
 def walk(model: Any, position: Real, velocity: Real, acceleration: Real) -> tuple[Real, tuple[Real, ...]]:
     """Follow a motion ``[dof, sample]``.
@@ -48,11 +45,11 @@ def walk(model: Any, position: Real, velocity: Real, acceleration: Real) -> tupl
 
 
 def inertia_rms(model: Any, position: Real) -> Real:
-    """Give ``[dof, dof]``: joint-space inertia, RMS over some poses of ``[dof, sample]``."""
+    """Give ``[dof, dof]``: joint-space inertia, RMS over poses ``[dof, pose]``."""
     import mujoco
 
     quiet, data = _quiet(model)
-    poses = position[:, :: max(position.shape[1] // _POSES, 1)].T
+    poses = position.T
     found, unit, product = np.zeros((quiet.nv, quiet.nv)), np.eye(quiet.nv), np.zeros(quiet.nv)
     for pose in poses:
         data.qpos[:] = pose
@@ -100,6 +97,13 @@ def tilted(model: Any, axis: int, angle: float) -> Any:
     # Seen from the base, gravity turns the other way.
     mujoco.mju_axisAngle2Quat(quaternion, np.eye(3)[axis], -angle)
     mujoco.mju_rotVecQuat(other.opt.gravity, np.array(model.opt.gravity), quaternion)
+    return other
+
+
+def weightless(model: Any) -> Any:
+    """Give the same robot without gravity."""
+    other = copy(model)
+    other.opt.gravity[:] = 0.0
     return other
 
 

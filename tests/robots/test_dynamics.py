@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chladni.robots.dynamics import gravity_columns, inertial_numbers, needed_torque
+from chladni.robots.dynamics import gravity_columns, inertia_columns_of_links, inertial_numbers, needed_torque
 from tests.robots.machines import arm
 
-pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco")
 
 
 def test_the_torque_is_linear_in_the_inertial_numbers(tmp_path: Path) -> None:
@@ -22,6 +22,21 @@ def test_the_torque_is_linear_in_the_inertial_numbers(tmp_path: Path) -> None:
     np.testing.assert_allclose(links + joints, need.torque, atol=1e-12)
 
 
+def test_inertia_between_joints_is_the_sum_of_what_links_add(tmp_path: Path) -> None:
+    robot, poses = arm(tmp_path), np.array([[0.3, -0.2, 1.1], [-0.4, 0.5, 0.9]])
+    links = np.einsum("lp,lpijk->ijk", inertial_numbers(robot), inertia_columns_of_links(robot, poses, [0, 1]))
+    data, whole = mujoco.MjData(robot.model), np.zeros((2, 2))
+    for pose, found in zip(poses.T, np.moveaxis(links, 2, 0), strict=True):
+        data.qpos[:] = pose
+        mujoco.mj_forward(robot.model, data)
+        mujoco.mj_fullM(robot.model, data, whole)
+        np.testing.assert_allclose(found, whole - np.diag([one.armature for one in robot.joints]), atol=1e-12)
+    # About the shoulder, of a straight arm: each link's own and where it is.
+    straight = inertia_columns_of_links(robot, np.zeros((2, 1)), [0])[..., 0, 0, 0]
+    closed_form = (0.02 + 2.0 * 0.2**2) + (0.01 + 1.0 * 0.5**2)
+    assert np.sum(inertial_numbers(robot) * straight) == pytest.approx(closed_form)
+
+
 def test_a_pendulum_needs_what_a_closed_form_says(tmp_path: Path) -> None:
     robot = arm(tmp_path)
     angle = np.linspace(-1.0, 1.0, 9)
@@ -30,9 +45,6 @@ def test_a_pendulum_needs_what_a_closed_form_says(tmp_path: Path) -> None:
     # Both links stand on the shoulder: m g l sin q each, and an axis along y turns them over.
     moment = 9.81 * (2.0 * 0.2 + 1.0 * 0.5)
     np.testing.assert_allclose(need.torque[0], -moment * np.sin(angle), atol=1e-12)
-    # The inertia about the shoulder, of a straight arm: armature, then each link's own and where it is.
-    straight = 0.1 + (0.02 + 2.0 * 0.2**2) + (0.01 + 1.0 * 0.5**2)
-    assert needed_torque(robot, still[:, :1], still[:, :1], still[:, :1]).inertia[0, 0] == pytest.approx(straight)
 
 
 def test_a_base_that_is_turned_about_y_is_a_shoulder_that_is(tmp_path: Path) -> None:

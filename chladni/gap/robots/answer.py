@@ -142,7 +142,7 @@ class Answer:
             if one not in self.named and one.gain > TEMPER and one.is_felt
             for row in one.acts
         }
-        left = self._contest.over_rounding(self._best.left.energy)
+        left = self._contest.over_rounding(self._best.energy)
         beyond = np.flatnonzero((self._contest.unknowns(self._best) > TEMPER) & (left > 1.0))
         named = {row for one in self.named for row in one.acts}
         return tuple(sorted({*beyond.tolist(), *(doubted - named)}))
@@ -313,7 +313,7 @@ def _weighed(solved: Solved, place: int) -> Weighed:
     wider = named * sum(float(np.exp(nats / TEMPER)) for nats in open_laws.values())
     near += [one for one, nats in open_laws.items() if nats > -CLOSE]
     whole = (float(np.sum(weight)) + wider) / (1.0 - LAPSE)
-    lost = rest.left.energy - best.left.energy
+    lost = rest.energy - best.energy
     # What tolerances take over when they're stretched is felt, too.
     strained = rest.strain - best.strain
     shares = contest.shares(best, place)
@@ -401,7 +401,7 @@ def _where(solved: Solved, fit: Fit) -> Where:
         channels=tuple(
             ChannelGap(name=name, gap=float(np.sqrt(np.mean(row**2)) / size), noise=float(noise / size),
                        noise_from="what encoders (and effort sensors) round and shake by")
-            for name, row, size, noise in zip(names, residual, usual, torques.noise[rows], strict=True)
+            for name, row, size, noise in zip(names, residual, usual, solved.contest.noise(fit)[rows], strict=True)
         ),
         bands=band_shares(residual, drive, sample_rate_hz=rate),
         sites=tuple(
@@ -429,7 +429,7 @@ def _of_torques(solved: Solved, named: Sequence[Term]) -> Closing:
         return float(np.sqrt(np.mean((((torques.missing - part) / scale)[there]) ** 2)))
 
     tuned, full = (left(apart.explained(apart.fit(one))) for one in ((), named))
-    noise = np.broadcast_to(torques.noise[:, None] / scale, there.shape)[there]
+    noise = np.broadcast_to(solved.contest.noise(solved.best)[:, None] / scale, there.shape)[there]
     return _closing(
         left(np.zeros_like(torques.missing)), tuned, full, float(np.sqrt(np.mean(noise**2))), named=bool(named),
         by="torque", held_out=_held_out(torques, torques.log.time_s[torques.kept][judge], torques.rate_hz),

@@ -78,7 +78,7 @@ class Contest:
         self._fits: dict[tuple[tuple[int, ...], bytes | None], Fit] = {}
         self._promises: dict[tuple[tuple[int, ...], bytes, bytes], Real] = {}
         self.nothing = self.fit(())
-        self._before = self.nothing.left.energy
+        self._before = self.nothing.energy
         self._fits.clear()
 
     def _row(self, row: int, numbers: Index, columns: Real) -> Row:
@@ -149,14 +149,17 @@ class Contest:
             for first, last, share in arms:
                 least[first] = max(share * float(np.linalg.norm(numbers[first + 1 : last])), 0.0)
                 numbers[first] = max(numbers[first], least[first])
-            left = self._left(moments, numbers, laws, self._passing(terms, numbers), self._units(terms, numbers))
-            weight = left.weight
+            louder = self._louder(terms, numbers)
+            shares = self._passing(terms, numbers), self._units(terms, numbers), louder
+            left = self._left(moments, numbers, laws, *shares)
+            weight = left.weight / louder
         root = root_of(moments.information(weight) + belief)
         size = -0.5 * float((numbers - mean) @ belief @ (numbers - mean)) - float(np.sum(np.log(np.diag(root))))
         size += 0.5 * narrow
         return Fit(
             terms=tuple(terms), numbers=numbers, root=root, left=left, within=self.within,
             nats=float(np.sum(left.log_likelihood)) + size + self.prior.nats(terms), weight=weight,
+            louder=louder,
         )  # fmt: skip
 
     def tolerances(self, fit: Fit) -> dict[str, tuple[float, float]]:
@@ -268,24 +271,51 @@ class Contest:
             place += len(term.numbers)
         return found
 
-    def _left(self, moments: Moments, numbers: Real, laws: Real, passing: Real, units: Real) -> JointsLeft:
+    def _louder(self, terms: Sequence[Term], numbers: Real) -> Real:
+        """Give ``[row]``: power of the noise over that of the machine as described.
+
+        What readings shake by asks for more torque the more inertia it moves. The likelihood is that of the readings:
+        what makes more torque of their noise makes as much more of all that they say, so that no determinant is left.
+        """
+        torques, found, place = self.torques, np.ones(len(self._energy)), self.within
+        inertia = torques.inertia
+        for term in terms:
+            count = len(term.numbers)
+            if term.added_inertia is not None:
+                added = numbers[place : place + count] * term.scale
+                inertia = inertia + np.tensordot(added, term.added_inertia, 1)
+            place += count
+        if inertia is not torques.inertia:
+            joints = slice(len(torques.joints))
+            more = torques.reading_noise_at(inertia) - torques.reading_noise_at(torques.inertia)
+            found[joints] += more / torques.noise[joints] ** 2
+        return found
+
+    def _left(
+        self, moments: Moments, numbers: Real, laws: Real, passing: Real, units: Real, louder: Real
+    ) -> JointsLeft:
         at_rows = moments.at_rows(numbers)
         energy = (self._energy - 2.0 * np.sum(moments.right * at_rows, axis=1) + moments.power(at_rows)) / passing
-        energy += np.maximum(energy - self.count, 0.0) * (1.0 / units - 1.0)
+        energy += np.maximum(energy - self.count * louder, 0.0) * (1.0 / units - 1.0)
         # Neither a law that is undone by tolerances nor one that adds nothing has details.
         force = np.minimum(moments.power(laws * at_rows), self._before - energy)
-        return JointsLeft(energy=np.maximum(energy, 0.0), count=self.count, force=np.maximum(force, 0.0))
+        return JointsLeft(
+            energy=np.maximum(energy, 0.0) / louder, count=self.count, force=np.maximum(force, 0.0) / louder
+        )
 
     def quietest(self, fit: Fit) -> Real:
-        """Give ``[row]``: least energy over the noise that a fit leaves, or with the term more that promises most."""
-        found = fit.left.over_noise
+        """Give ``[row]``: least energy over the noise that a fit leaves, or with the term more that promises most.
+
+        As the machine that is described would leave it.
+        """
+        found = fit.over_described
         taken = {term.key for term in fit.terms}
         for row in range(len(found)):
             alone = np.zeros(len(found))
             alone[row] = 1.0
             _, term = next(one for one in self.promise(replace(fit, weight=alone)) if one[1].key not in taken)
             more = self.fit([*fit.terms, term], fit)
-            found = np.minimum(found, more.left.over_noise)
+            found = np.minimum(found, more.over_described)
         return found
 
     def weighed_as(self, fit: Fit, weight: Real) -> Fit:
@@ -315,8 +345,12 @@ class Contest:
         """
         joints = slice(len(self.torques.joints))
         there = self.torques.numbers_a_sample * self.torques.without(()).moving[joints]
-        rest = (self.torques.missing - self.explained(fit))[joints] / self.torques.noise[joints, None]
+        rest = (self.torques.missing - self.explained(fit))[joints] / self.noise(fit)[joints, None]
         return np.asarray(there * rest**2), np.asarray(there, dtype=np.float64)
+
+    def noise(self, fit: Fit) -> Real:
+        """``[row]``: standard deviation of the missing torque that the noise of a fit's machine gives."""
+        return self.torques.noise * np.sqrt(fit.louder)
 
     def of_terms(self, fit: Fit) -> Real:
         """Give ``[row, coarse]``: what the terms explain, without tolerances."""

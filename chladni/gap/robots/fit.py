@@ -29,7 +29,9 @@ class Fit:
     within
         How many of the numbers are of tolerances.
     weight
-        ``[joint]``: times that energy which is left there costs as much as the noise's.
+        ``[row]``: times that energy which is left there costs as much as the noise's of the machine as described.
+    louder
+        ``[row]``: power of the noise with this machine, over that.
     """
 
     terms: tuple[Term, ...]
@@ -39,6 +41,17 @@ class Fit:
     nats: float
     within: int
     weight: Real
+    louder: Real
+
+    @property
+    def energy(self) -> Real:
+        """``[row]``: left, whitened by the noise of the machine as described."""
+        return self.left.energy * self.louder
+
+    @property
+    def over_described(self) -> Real:
+        """``[row]``: what is left over the noise, less what this machine's inertia adds to it."""
+        return 1.0 + self.louder * (self.left.over_noise - 1.0)
 
     @property
     def covariance(self) -> Real:

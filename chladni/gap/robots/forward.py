@@ -206,7 +206,7 @@ def _transmission(one: MachineJoint, term: Term, values: Real, torques: Torques)
     # Where the log has efforts its product with the rotor is told.
     gives = found[first] if first in found else found["both"] / rotor if rotor else 0.0
     # A motor without a rotor can't be run.
-    rotor = max(rotor, LEAST_ROTOR * float(torques.need.inertia[one.joint.dof, one.joint.dof]))
+    rotor = max(rotor, LEAST_ROTOR * float(torques.usual_inertia[torques.log.joints.index(one.joint.name)]))
     yields = max(found.get("compliance", 0.0) if first == "gap" else gives, 0.0)
     made = Transmission(
         stiffness=1.0 / yields if yields else np.inf, gap=max(gives, 0.0) if first == "gap" else 0.0, inertia=rotor,

@@ -51,13 +51,14 @@ def _step(row: Real) -> float:
 def torque_noise(density: Real, cutoff_hz: float, *, stiffness: Real, damping: Real, inertia: Real) -> Real:
     """Give ``[joint]``: variance of the torque that noise of the positions seems to need below a cutoff.
 
-    Of stiffness (the servos') and damping at the joints, and of the inertia ``[joint, joint]`` by which each feels
-    the others: |k + i w d - w^2 m|^2 times the densities.
+    Of stiffness (the servos') and damping at the joints, and of the inertia ``[joint, joint, pose]`` by which each
+    feels all of them: |k + i w d - w^2 m|^2 times the densities.
     """
     omega = 2.0 * np.pi * np.linspace(0.0, cutoff_hz, _LINES)
-    own = np.abs(stiffness[:, None] + 1j * omega * damping[:, None] - omega**2 * np.diag(inertia)[:, None]) ** 2
-    others = (inertia - np.diag(np.diag(inertia))) ** 2 @ density * float(np.mean(omega**4))
-    return np.asarray((density * np.mean(own, axis=1) + others) * cutoff_hz)
+    squared, fourth = float(np.mean(omega**2)), float(np.mean(omega**4))
+    own = np.mean(np.diagonal(inertia), axis=0)
+    gain = stiffness**2 + (damping**2 - 2.0 * stiffness * own) * squared
+    return np.asarray((density * gain + fourth * np.mean(inertia**2, axis=2) @ density) * cutoff_hz)
 
 
 def imu_noise(force: float, turning: float, cutoff_hz: float, *, carried: Real, place: Real) -> Real:

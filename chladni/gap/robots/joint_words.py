@@ -8,7 +8,7 @@ from itertools import accumulate
 import numpy as np
 
 from chladni.gap.robots.motion import rms
-from chladni.gap.robots.term import Form, Number, Term, at_row, formed, law, length, units, usual
+from chladni.gap.robots.term import Form, Number, Term, at_row, formed, law, length, rotor_at, units, usual
 from chladni.gap.robots.torques import Torques
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
@@ -206,7 +206,8 @@ def inertia(torques: Torques) -> Iterator[Term]:
             nominal=joint.armature, scale=usual(torques, row) / rms(torques.acceleration[row]),
         )  # fmt: skip
         make = partial(at_row, torques, row, torques.acceleration[row])
-        yield Term(word="armature", site=joint.name, make=make, numbers=(number,))
+        turning = partial(rotor_at, torques, row, 0, 1)
+        yield Term(word="armature", site=joint.name, make=make, numbers=(number,), inertia=turning)
 
 
 def ripple(torques: Torques) -> Iterator[Term]:

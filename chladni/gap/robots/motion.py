@@ -14,7 +14,15 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from chladni.gap.robots.joint_noise import imu_noise, steps_and_noise, upper_density
-from chladni.robots.dynamics import Needed, carried_columns, gravity_columns, motion_torque, needed_torque
+from chladni.robots.dynamics import (
+    Needed,
+    carried_columns,
+    gravity_columns,
+    inertia_columns_of_links,
+    inertial_numbers,
+    motion_torque,
+    needed_torque,
+)
 from chladni.robots.floating_base import BaseMotion, FloatingBase, at_origin, floating_base, place_on_base
 from chladni.robots.joint_log import JointLog
 from chladni.robots.robot import Robot, RobotJoint
@@ -30,6 +38,8 @@ LEAST = 12.0
 #: Of its usual speed: within this a joint could move either way, however fine its encoder.
 _STILL = 0.002
 _ORDER = 4
+#: Poses at which the inertia between joints is asked for.
+_POSES = 16
 #: By how much a joint is turned to tell what that changes, rad (m), RMS.
 TURN = 1e-4
 #: Share of rest within the filter's length up to which a sample counts as moving.
@@ -258,6 +268,23 @@ class Motion:
     def need(self) -> Needed:
         """What the motion needs, of every degree of freedom."""
         return needed_torque(self.robot, self.all_positions, *self._rates)
+
+    @cached_property
+    def inertia_of_links(self) -> Real:
+        """``[link, 10, joint, joint, pose]``: inertia a unit of the links' inertial numbers, at some poses."""
+        poses = self.all_positions[:, :: max(self.position.shape[1] // _POSES, 1)]
+        return inertia_columns_of_links(self.robot, poses, [one.dof for one in self.joints])
+
+    @cached_property
+    def inertia(self) -> Real:
+        """``[joint, joint, pose]``: as described, kg m^2 (kg)."""
+        links = np.einsum("lp,lp...->...", inertial_numbers(self.robot), self.inertia_of_links)
+        return np.asarray(links + np.diag([one.armature for one in self.joints])[..., None])
+
+    @cached_property
+    def usual_inertia(self) -> Real:
+        """``[joint]``: RMS of a joint's own."""
+        return np.asarray(np.sqrt(np.mean(np.diagonal(self.inertia) ** 2, axis=0)))
 
     @cached_property
     def carried(self) -> Real:

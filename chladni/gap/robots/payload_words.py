@@ -1,6 +1,6 @@
 """Words of links, of readings and of the world; and what tolerances allow for."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
@@ -52,11 +52,17 @@ def bodies(torques: Torques) -> Iterator[Term]:
     for name, own, columns in _links(torques):
         if own[0] > 0:
             make = partial(_of_whole, own, columns)
-            yield Term(word=PARAMETER, site=f"{name}.mass", make=make, numbers=(mass,))
+            heavier = partial(_added, torques, name, partial(_of_whole, own))
+            yield Term(word=PARAMETER, site=f"{name}.mass", make=make, numbers=(mass,), inertia=heavier)
 
 
 def _of_whole(own: Real, columns: Real) -> Real:
-    return np.asarray(np.einsum("p,pjk->jk", own, columns)[None])
+    return np.tensordot(own, columns, 1)[None]
+
+
+def _added(torques: Torques, link: str, of_columns: Callable[[Real], Real]) -> Real:
+    """Inertia between joints that numbers of a link add, by what makes columns of them."""
+    return of_columns(torques.inertia_of_links[torques.robot.links.index(link)])
 
 
 def payloads(torques: Torques) -> Iterator[Term]:
@@ -71,12 +77,14 @@ def payloads(torques: Torques) -> Iterator[Term]:
     for name, _, columns in _links(torques):
         # What is fixed to a link moves as one with it: a payload on it is one on the link.
         if name in moved:
-            make = partial(_of_ball, columns, torques.guesses.centre_m.get(name, np.zeros(3)))
-            yield Term(word="payload", site=name, make=make, numbers=load, reach=_FAR * _REACH_M)
+            of_columns = partial(_of_ball, torques.guesses.centre_m.get(name, np.zeros(3)))
+            heavier = partial(_added, torques, name, of_columns)
+            make = partial(of_columns, columns)
+            yield Term(word="payload", site=name, make=make, numbers=load, reach=_FAR * _REACH_M, inertia=heavier)
 
 
-def _of_ball(columns: Real, centre_m: Real) -> Real:
-    """``[5, row, coarse]``: of a mass, its three moments and the inertia about its centre."""
+def _of_ball(centre_m: Real, columns: Real) -> Real:
+    """``[5, ...]`` of ``[10, ...]``: of a mass, its three moments and the inertia about its centre."""
     point = columns[:4] + np.tensordot(_slopes_of_point(centre_m), columns[4:], 1)
     return np.concatenate([point, np.sum(columns[4:7], axis=0, keepdims=True)])
 

@@ -118,6 +118,9 @@ class Term:
         Whether few machines have it.
     ratio
         Of what acts between two joints: by which the second moves it, over the first; None of all others.
+    inertia
+        Gives ``[number, joint, joint, pose]``: inertia that a unit of each number adds, which makes more torque of
+        what readings shake by. None where none does.
     reach
         How far the next three numbers, as a vector, can lie from the first as its arm: a mass and its first moment.
     """
@@ -129,6 +132,7 @@ class Term:
     rows: tuple[int, ...] = ()
     variant: str | None = None
     form: Form | None = None
+    inertia: Callable[[], Real] | None = None
     reach: float | None = None
     plainer: str | None = None
     adds_form: bool = False
@@ -144,6 +148,11 @@ class Term:
         Made when it's asked for: most words don't take part where a motion is laid out.
         """
         return parts_of(self.make())
+
+    @cached_property
+    def added_inertia(self) -> Real | None:
+        """``[number, joint, joint, pose]``."""
+        return None if self.inertia is None else self.inertia()
 
     def explains(self, numbers: Real) -> dict[int, Real]:
         """Give ``[coarse]`` by row: missing torque that numbers beside the nominal ones explain."""
@@ -215,6 +224,13 @@ def at_row(torques: Torques, row: int, *columns: Real) -> Real:
     """Give ``[number, row, coarse]`` of columns of one row."""
     found = np.zeros((len(columns), *torques.missing.shape))
     found[:, row] = columns
+    return found
+
+
+def rotor_at(torques: Torques, row: int, place: int, count: int) -> Real:
+    """Give ``[number, joint, joint, 1]`` of some numbers of which one is an inertia that turns with a joint."""
+    found = np.zeros((count, len(torques.joints), len(torques.joints), 1))
+    found[place, row, row] = 1.0
     return found
 
 

@@ -355,16 +355,17 @@ class Torques(Motion):
         """``[row, coarse]``: what is missing beyond what was explained already."""
         return self.missing if self.explained is None else self.missing - self.explained
 
-    @cached_property
-    def sensed_noise(self) -> Real:
-        """``[row]``: standard deviation that the noise of sensors gives the missing torque."""
-        dofs = [one.dof for one in self.joints]
-        inertia = self.need.inertia[np.ix_(dofs, dofs)]
+    def reading_noise_at(self, inertia: Real) -> Real:
+        """Give ``[joint]``: variance of missing torque by readings, of an inertia ``[joint, joint, pose]``."""
         damping = np.array([one.damping for one in self.joints])
         by_position = not self.by_effort and self.log.command_kind == "position"
         kp, kd = (one * by_position for one in (self.kp, self.kd))
-        found = torque_noise(self._steps[1], self.cutoff_hz, stiffness=kp, damping=kd + damping, inertia=inertia)
-        found = found + self._noise_of_base
+        return torque_noise(self._steps[1], self.cutoff_hz, stiffness=kp, damping=kd + damping, inertia=inertia)
+
+    @cached_property
+    def sensed_noise(self) -> Real:
+        """``[row]``: standard deviation that the noise of sensors gives the missing torque, as described."""
+        found = self.reading_noise_at(self.inertia) + self._noise_of_base
         if not self.by_effort:
             return np.sqrt(found)
         rate, stretches = self.log.sample_rate_hz, self.stretches

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from chladni.gap.robots.motion import rms
-from chladni.gap.robots.term import PART, Number, Term, at_row, formed, length, usual
+from chladni.gap.robots.term import PART, Number, Term, at_row, formed, length, rotor_at, usual
 from chladni.gap.robots.torques import Torques
 from chladni.robots.robot import RobotJoint
 from chladni.signals.arrays import Real
@@ -58,7 +58,7 @@ def _over(joint: RobotJoint) -> str:
 def _rotor(torques: Torques, row: int, joint: RobotJoint) -> Number:
     scale = usual(torques, row) / rms(torques.acceleration[row])
     # A motor has a rotor, here or in the description.
-    least = 0.0 if joint.armature else LEAST_ROTOR * float(torques.need.inertia[joint.dof, joint.dof])
+    least = 0.0 if joint.armature else LEAST_ROTOR * float(torques.usual_inertia[row])
     return Number(
         name="inertia", unit="kg m^2" if joint.kind == "hinge" else "kg", scale=scale, least=least,
         nominal=joint.armature, is_exact=True,
@@ -77,10 +77,14 @@ def _between(torques: Torques, row: int, joint: RobotJoint, word: str, ahead: Re
         numbers = (number, *numbers, *[PART] * bool(np.any(torques.over_limit[row])))
     if known or torques.by_effort:
         make = partial(_at_link, torques, row, ahead, loop_is_known=known)
-        yield Term(word=word, site=joint.name, make=make, numbers=numbers, rows=rows, variant=AT_LINK, rare=True)
+        turning = partial(rotor_at, torques, row, numbers.index(rotor), len(numbers))
+        yield Term(
+            word=word, site=joint.name, make=make, numbers=numbers, rows=rows, variant=AT_LINK, rare=True,
+            inertia=turning,
+        )  # fmt: skip
     yield Term(
         word=word, site=joint.name, make=partial(_at_motor, torques, row, ahead), numbers=(rotor, number),
-        rows=(row,), variant=AT_MOTOR, rare=True, plainer="armature",
+        rows=(row,), variant=AT_MOTOR, rare=True, plainer="armature", inertia=partial(rotor_at, torques, row, 0, 2),
     )  # fmt: skip
 
 
@@ -128,6 +132,7 @@ def _play(torques: Torques, row: int, joint: RobotJoint, passed: Real, soft: Num
         return Term(
             word="backlash", site=joint.name, make=columns, numbers=(PART, rotor, soft), rows=rows, variant=AT_LINK,
             takes=True, rare=True, plainer="joint_elasticity", adds_form=True,
+            inertia=partial(rotor_at, torques, row, 1, 3),
         )  # fmt: skip
 
     grid = 2.0 * np.quantile(np.abs(asked), _PLAYS) / kp
