@@ -1,4 +1,4 @@
-"""Two rows of the diagnosis that no campaign holds: sound machines, and a log beside models that are ever more wrong.
+"""Rows of the diagnosis that no campaign holds: sound machines, models that are ever more wrong, logs of others.
 
 ``sound``: chains of two to four bodies with nothing missing, their values off by less than a tolerance, driven by
 what a converter holds or by a band-limited signal, with 0.3 and 1 % of noise. SciPy follows them: held forces
@@ -6,15 +6,19 @@ exactly, band-limited ones as straight lines on a grid that is 32 times finer. E
 
 ``nominal``: one log of a machine with a cause, beside models whose values are 0, 1, 5 and 20 tolerances off. The
 answer may weaken to `unknown`, or tell the wrong value beside the cause; it should never name another effect.
+
+``logs``: measured logs, and made ones of machines that nobody here drew, each with the model that its folder or
+``models`` holds. What is missing is known from their publications (``data/README.md``, ``answer.txt``).
 """
 
 import argparse
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import cont2discrete, dlsim
@@ -39,6 +43,48 @@ CAUSES = (
     ("time_offset", "a2", {"offset": 1.5e-3}),
 )
 OFF = (0.0, 1.0, 5.0, 20.0)
+SHARED = Path(__file__).parents[2] / "shared" / "data"
+MODELS = {"mr_1A": "mr_damper"}
+#: A name below this is a suggestion.
+NAMED = 0.6
+FRICTION = ("coulomb_friction", "stribeck_friction", "hysteresis")
+
+
+class Known(NamedTuple):
+    """What is right of a log: a name of each set, and whether `unknown` is right as well."""
+
+    needed: tuple[set[str], ...]
+    unknown: bool = True
+    end_s: float | None = None
+
+
+def among(words: Sequence[str], site: str) -> set[str]:
+    """Each of these words at a site."""
+    return {f"{word} at {site}" for word in words}
+
+
+LOGS = {
+    "diagnosis/a1_missing_ground_spring": Known((among(["missing_link"], "ground~wrist"),)),
+    "diagnosis/arts_80lb": Known((among(FRICTION, "damper"), among(["backlash"], "damper"))),
+    "diagnosis/b4_typo": Known((among([PARAMETER], "grip.stiffness"),), unknown=False),
+    "diagnosis/bouc_wen_benchmark": Known((among(["hysteresis"], "spring"),), unknown=False),
+    "diagnosis/c1_friction_and_light_mass": Known((among(FRICTION, "elbow"), among([PARAMETER], "tool.mass"))),
+    "diagnosis/coupled_drives": Known(()),
+    "diagnosis/g2_one_clock_200ppm": Known((among(["clock_drift", "time_offset"], "acc_tool"),)),
+    "diagnosis/h1_soft_stinger": Known(()),
+    "diagnosis/i2_all_warming": Known(
+        tuple(among(["varying_stiffness"], joint) for joint in ("base", "shoulder", "elbow", "grip"))
+    ),
+    "diagnosis/p2_none_smooth_1pct": Known((), unknown=False),
+    "diagnosis/w1_four_frictions": Known(
+        tuple(among(FRICTION, joint) for joint in ("base", "shoulder", "elbow", "grip"))
+    ),
+    "diagnosis/wang_mr_damper_sign_right": Known((among(FRICTION, "damper"),), unknown=False),
+    "diagnosis/x1_compressor": Known((among(["tonal_disturbance"], "column"),)),
+    "emps": Known((among(FRICTION, "guide"),), unknown=False),
+    "silverbox": Known((among(["hardening_stiffness"], "spring"),), unknown=False, end_s=60.0),
+    "mr_1A": Known((among(FRICTION, "damper"),), unknown=False),
+}
 
 
 def drawn(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -126,6 +172,30 @@ def judged(word: str, found: Diagnosis) -> str:
     return "another name" if named - {word} else "named" if named else "not named"
 
 
+def of_log(name: str) -> tuple[str, str, str]:
+    """Diagnose a log of others, and judge the answer."""
+    folder = SHARED / name
+    if folder.is_dir():
+        model, log = folder / "model.toml", folder / "log.mcap"
+    else:
+        model, log = SHARED / "models" / f"{MODELS.get(name, name)}.toml", folder.with_suffix(".mcap")
+    known = LOGS[name]
+    found = chladni.diagnose_gap(model, log, end_s=known.end_s)
+    return name, answer(found), against(known, found)
+
+
+def against(known: Known, found: Diagnosis) -> str:
+    """How an answer stands to what is known: each needed cause named and nothing else, or `unknown` where allowed."""
+    named = {f"{one.effect} at {one.site}" for one in found.causes if one.probability >= NAMED}
+    if named - set[str]().union(*known.needed):
+        return "wrong"
+    if not named and found.verdict != "none":
+        return "rightly in doubt" if known.unknown else "missed"
+    if not named and (known.needed or known.unknown):
+        return "missed"
+    return "right" if all(named & one for one in known.needed) else "half"
+
+
 def rows(jobs: int, function, cases: list) -> Iterator:
     """Results as they come, of as many processes."""
     with ProcessPoolExecutor(jobs) as pool:
@@ -135,7 +205,7 @@ def rows(jobs: int, function, cases: list) -> Iterator:
 def main() -> None:
     """Print a line a case, then the counts."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["sound", "nominal"])
+    parser.add_argument("what", choices=["sound", "nominal", "logs"])
     parser.add_argument("--count", type=int, default=60, help="sound machines")
     parser.add_argument("--jobs", type=int, default=1)
     arguments = parser.parse_args()
@@ -146,6 +216,10 @@ def main() -> None:
         for kind, said in rows(arguments.jobs, sound, cases):
             counts[said.partition(":")[0]] += 1
             print(f"{kind}: {said}", flush=True)
+    elif arguments.what == "logs":
+        for name, said, how in rows(arguments.jobs, of_log, list(LOGS)):
+            counts[how] += 1
+            print(f"{name}: {how}: {said}", flush=True)
     else:
         for word, off, found in rows(arguments.jobs, beside_nominal, list(product(range(len(CAUSES)), OFF))):
             counts[judged(word, found)] += 1
