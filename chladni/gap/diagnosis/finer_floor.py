@@ -36,10 +36,12 @@ def finer_floor(study: Study, best: Contestant) -> NoiseFloor | None:
 
 
 def share_of_own_signal(simulated: Real, residual: Real) -> Real:
-    """Share of each residual's power that a curve over what the sensor should show explains, but for straight lines.
+    """Share of each residual's variance that a curve over its simulated signal explains, but for a straight line.
 
     A noise floor that comes from what no linear model explains holds a sensor's distortion and its steps too, and
-    nothing would ever stand out of it. What the signal itself explains is a gain's or a parameter's.
+    nothing would ever stand out of it. What the signal itself explains is a gain's or a parameter's. A curve of many
+    points takes some of any noise: variances are those of the degrees of freedom that are left, the *adjusted* R^2 of
+    Ezekiel (1930), which is zero on average for noise of any length.
 
     Parameters
     ----------
@@ -48,12 +50,13 @@ def share_of_own_signal(simulated: Real, residual: Real) -> Real:
 
     Returns
     -------
-    ``[output]`` 0 to 1.
+    ``[output]`` up to 1; below 0 where it explains less than chance would.
     """
     found = np.zeros(len(simulated))
     for row, (signal, left) in enumerate(zip(simulated, residual, strict=True)):
-        plain = _power(_rest([np.ones_like(signal), signal], left))
-        found[row] = 1.0 - _power(_rest(hats(signal, LAW_POINTS), left)) / plain if plain > 0 else 0.0
+        line, curve = [np.ones_like(signal), signal], hats(signal, LAW_POINTS)
+        plain = _variance(line, left)
+        found[row] = 1.0 - _variance(curve, left) / plain if plain > 0 and left.size > len(curve) else 0.0
     return found
 
 
@@ -72,5 +75,6 @@ def _rest(functions: list[Real], target: Real) -> Real:
     return np.asarray(target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0])
 
 
-def _power(row: Real) -> float:
-    return float(row @ row)
+def _variance(functions: list[Real], target: Real) -> float:
+    rest = _rest(functions, target)
+    return float(rest @ rest) / max(target.size - len(functions), 1)

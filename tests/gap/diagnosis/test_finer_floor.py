@@ -98,6 +98,13 @@ def test_curves_and_steps_are_seen_and_a_gain_and_noise_are_not() -> None:
     assert np.all(found[2:] < 0.01)
 
 
+def test_noise_of_a_short_log_follows_nothing() -> None:
+    signal, noise = np.random.default_rng(9).standard_normal((2, 400, 150))
+    found = share_of_own_signal(signal, noise)
+    # A curve of sixty points takes two fifths of it by chance: the mean is within three standard errors of none.
+    assert abs(found.mean()) < 3 * found.std() / np.sqrt(400)
+
+
 def test_a_sensor_that_shows_nothing_follows_nothing() -> None:
     assert share_of_own_signal(np.zeros((1, 50)), np.zeros((1, 50)))[0] == 0.0
 
