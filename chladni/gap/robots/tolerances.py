@@ -47,21 +47,19 @@ def tolerances(torques: Torques) -> tuple[Real, list[str]]:
         common = torques.guesses.late_s.get(ALL_COMMANDS, 0.0)
         found.append(("turn", LOOP_S * torques.at_servos(torques.late(common, 0.0))))
     command = torques.log.command if torques.log.command_kind == "position" else None
-    if torques.by_effort and command is not None:
+    if torques.two_sided:
+        # Between efforts commands may come any time that leaves the efforts as they are.
+        found.append(("later", torques.doubt_s * torques.later))
+        found += ((f"{one.name}.within", at_row(torques, row, torques.within[row])[0]) for row, one in torques.rows)
+    elif torques.by_effort and command is not None:
         # Efforts are sampled while commands are held: always just after a step, or just before it.
         half_s = 0.5 / torques.log.sample_rate_hz
         between = torques.smooth(np.nan_to_num(torques.mean_command(0.0, half_s) - command))
-        for row, _ in torques.rows:
+        for row, joint in torques.rows:
             stiffness = torques.kp[row] or usual(torques, row) / rms(
                 torques.position[row] - np.mean(torques.position[row])
             )
-            name = torques.joints[row].name
-            found.append((f"{name}.hold", at_row(torques, row, stiffness * between[row])[0]))
-            if torques.two_sided:
-                found.append((f"{name}.within", at_row(torques, row, torques.within[row])[0]))
-        if torques.two_sided:
-            # Between efforts commands may come any time that leaves the efforts as they are.
-            found.append(("later", torques.doubt_s * torques.later))
+            found.append((f"{joint.name}.hold", at_row(torques, row, stiffness * between[row])[0]))
     columns = np.zeros((len(found), *torques.missing.shape))
     for place, (_, column) in enumerate(found):
         columns[place, : len(column)] = column

@@ -242,20 +242,34 @@ class Torques(Motion):
         """``[joint, sample]``: torque that position loops ask for, before their limits."""
         return self.by_row("kp")[:, None] * self.error - self.kd[:, None] * self.loop_velocity
 
-    @cached_property
+    @property
     def loop_velocity(self) -> Real:
         """``[joint, sample]``: what the loops damp: of efforts at their instant, as the log reads it if that fits.
 
         Between held commands a joint trembles, which no difference of samples tells.
         """
-        read = self.log.velocity
-        if not self.two_sided or read is None:
-            return self.fast_velocity
-        pull = self.kp[:, None] * (self._held(0.0) - self.log.position) - self.fast_drive
-        inside = np.zeros(read.shape[1], dtype=bool)
-        inside[self.kept] = True
-        left = [np.std((pull - self.kd[:, None] * one)[:, inside], axis=1) for one in (read, self.fast_velocity)]
-        return np.where((left[0] < left[1])[:, None], read, self.fast_velocity)
+        return self._loops[0] if self.two_sided else self.fast_velocity
+
+    @cached_property
+    def _loops(self) -> tuple[Real, Real]:
+        """``[joint, sample]`` twice: velocities that loops damp, and what they ask for beyond the efforts.
+
+        With commands as late as leaves least: at another delay neither velocity fits.
+        """
+        read, count = self.log.velocity, len(self.joints)
+        velocities = (self.fast_velocity,) if read is None else (self.fast_velocity, read)
+        damped, beyond = self.fast_velocity.copy(), -self.fast_drive
+        least = np.full(count, np.inf)
+        step_s = 1.0 / max(self.log.sample_rate_hz, self.log.command_rate_hz or 0.0)
+        # What comes later than a quarter of a period belongs to another motion.
+        for late_s in np.arange(0.0, 0.25 / self.cutoff_hz, step_s).tolist():
+            pull = self.kp[:, None] * (self._held(late_s) - self.log.position) - self.fast_drive
+            for velocity in velocities:
+                rest = pull - self.kd[:, None] * velocity
+                left = np.std(rest[:, self.kept], axis=1)
+                better = left < least
+                damped[better], beyond[better], least[better] = velocity[better], rest[better], left[better]
+        return damped, beyond
 
     @cached_property
     def fast_drive(self) -> Real:
@@ -373,8 +387,7 @@ class Torques(Motion):
         if not self.two_sided:
             return np.sqrt(found + effort)
         # Efforts step with their commands, which is no noise: what loops ask for does so, too.
-        differs = self.kp[:, None] * (self._held(0.0) - self.log.position) - self.kd[:, None] * self.loop_velocity
-        loops = steps_and_noise(np.nan_to_num(differs) - self.fast_drive, rate, stretches)[1] * self.cutoff_hz
+        loops = steps_and_noise(self._loops[1], rate, stretches)[1] * self.cutoff_hz
         return np.asarray(np.sqrt(np.concatenate([found + np.minimum(effort, loops), loops])))
 
     @cached_property
@@ -458,7 +471,7 @@ class Torques(Motion):
         object.__setattr__(other, "guesses", guesses)
         object.__setattr__(other, "explained", explained)
         # Made for other guesses.
-        for name in ("loop", "rest", "within"):
+        for name in ("loop", "rest", "within", "later", "doubt_s"):
             vars(other).pop(name, None)
         return other
 

@@ -120,7 +120,7 @@ def test_about_a_delay_that_was_found_only_its_slope_is_left(tmp_path: Path) -> 
     assert abs(found.contest.tolerances(found.best)["turn"][0]) < 0.5
 
 
-@pytest.mark.parametrize("samples", [1.25, 1.75])
+@pytest.mark.parametrize("samples", [1.1, 1.25, 1.75, 1.9])
 def test_of_delays_that_leave_efforts_as_they_are_the_motion_tells_which(tmp_path: Path, samples: float) -> None:
     command, late_s = commands(6.0), samples / RATE_HZ
     position = run_native(arm(tmp_path, "machine/arm.xml", servo=f' delay="{late_s}" nsample="40"'), command)
@@ -138,8 +138,7 @@ def test_of_delays_that_leave_efforts_as_they_are_the_motion_tells_which(tmp_pat
     value, deviation, _ = found.numbers(place)["delay"]
     # A sample's interval has a deviation of more.
     assert deviation < 1.0 / RATE_HZ / np.sqrt(12.0)
-    assert value == pytest.approx(late_s, abs=deviation)
-    assert (value > 1.5 / RATE_HZ) == (samples > 1.5)
+    assert value == pytest.approx(late_s, abs=2e-4)
 
 
 @given(seed=st.integers(0, 2**32 - 1), acting=st.lists(st.booleans(), min_size=2, max_size=8))
