@@ -1,6 +1,7 @@
 """The search for two causes at once: one beside another, both at once, and each again beside the other."""
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from chladni.gap.explanation.linear_words import linear_hypotheses
 from chladni.gap.explanation.screen import Screened
 from chladni.gap.explanation.wrong_values import wrong_values
 from chladni.gap.location.locate import Located, Location, locate, located_pairs
+from chladni.gap.location.profile import with_own
 from chladni.models.core.model import Model
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.signals.arrays import Real
@@ -95,7 +97,7 @@ def paired_causes(study: Study, best: Contestant) -> Entered:
 def _two_forces(location: Location, pairs: Sequence[Located]) -> Located | None:
     """Give the pair that explains much more than one force does; any two explain two sensors."""
     near = _near_pairs(location, pairs) if len(location.problem.measured) > 2 else []
-    return near[0] if near else None
+    return replace(near[0], profile=with_own(location.problem, near[0].profile)) if near else None
 
 
 def _weighed_pairs(study: Study, best: Contestant, pairs: Sequence[Located]) -> list[tuple[Located, list[Form]]]:

@@ -69,6 +69,8 @@ class Search:
         self.states: KnownStates | None = None
         #: Behind which holds were asked last.
         self._held: list[Contestant] = []
+        #: Whose causes were left out last, one at a time.
+        self._whole: Contestant | None = None
         self.forces: Located | None = None
         self._tried: set[object] = set()
 
@@ -148,6 +150,8 @@ class Search:
         """Look for further causes, until nothing is left to be explained, or none helps."""
         progress(0.8)
         for _ in range(CAUSES):
+            # A wrong hold leaves what any further cause would imitate.
+            self._other_holds()
             if self._forces_end_it or not (self.is_open and self._one_more(progress)):
                 break
         self._other_holds()
@@ -218,9 +222,7 @@ class Search:
         self.states = pairs.states or self.states
         self.forces = pairs.forces or self.forces
         self.add(pairs.ranked)
-        if self.best is not self.nothing:
-            self._settle()
-            self.add(without_one(self.study, self.best))
+        self._settle()
 
     def _one_cause(self, progress: Step) -> tuple[list[Screened], list[Hypothesis]]:
         """Fit what the screen promises most of, and values that may be wrong; give what was screened and fitted."""
@@ -291,12 +293,14 @@ class Search:
             return False
         self.add(exchanged(study, self.best))
         self._settle()
-        while len(self.best.hypothesis.effects) > 1 and self.add(without_one(study, self.best)):
-            pass
         return self.belief.nats(self.best) > nats + WORTH
 
     def _settle(self) -> None:
-        """Fit the relatives of what leads, its details, and the sites that can't be told from its own."""
+        """Fit the relatives of what leads, its details, the sites that can't be told from its own, and fewer causes.
+
+        A cause that was found beside another one may have imitated the details of that one's law, which only now are
+        known: each is left out once, and what is believed then is settled likewise.
+        """
         study = self.study
         if not self.best.hypothesis.effects:
             return
@@ -306,6 +310,11 @@ class Search:
             if -one.left.at(self.belief.level).log_likelihood > WORTH:
                 self.add(_polished(study, one))
         self.enter(twins(self.best, study.location.places))
+        whole = self.best
+        if len(whole.hypothesis.effects) > 1 and whole is not self._whole:
+            self._whole = whole
+            if self.add(without_one(study, whole)):
+                self._settle()
 
     def _relatives(self) -> list[Hypothesis]:
         others = siblings(self.best, self.study.contest.run)

@@ -4,21 +4,24 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from chladni.gap.calibration import BEYOND_DOUBT, PLACES
+from chladni.gap.calibration import BEYOND_DOUBT, PLACES, WORTH
 from chladni.gap.explanation.evidence import Left, highest_level, left_by_force
 from chladni.gap.location.locate import Location
-from chladni.gap.location.profile import profiled
+from chladni.gap.location.profile import profile_at, profiled
 from chladni.gap.plant.linear_problem import LinearProblem
+from chladni.gap.plant.places import Site
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.model import Model
 from chladni.models.core.port import HOLDS, HoldKind
+from chladni.signals.arrays import Real
 
 
 def with_told_holds(model: Model, location: Location) -> Model:
     """Give the model with the holds of its inputs that a log tells.
 
-    What is missing somewhere hides what an input did between its samples. So each hold is weighed beside an unknown
-    force at each of the leading places, and without any, parameters tuned anew: the evidence of the best of these.
+    What is missing somewhere hides what an input did between its samples, and a wrong hold hides where it is missing.
+    So each hold is weighed beside an unknown force at each of the places that lead with it, and without any,
+    parameters tuned anew: the evidence of the best of these.
     That tells what the force was behind what is missing, as a lag makes any hold smooth: a hypothesis, which causes
     are to compete with.
     Inputs whose hold the model states, which never move, or whose rate acts too, are left as they are; so are all
@@ -42,7 +45,7 @@ def with_told_holds(model: Model, location: Location) -> Model:
         for tried in changed(told, others):
             found, elsewhere = _weighed(tried, location)
             # Where a hold doesn't bring all down to the noise, what else is missing may pass for it.
-            if found - price(model, tried) > nats - price(model, told) and not elsewhere:
+            if found - price(model, tried) > nats - price(model, told) and elsewhere < WORTH:
                 told, nats = tried, found
     return told
 
@@ -77,8 +80,18 @@ def _weighed(model: Model, location: Location) -> tuple[float, float]:
     tuned = profiled(problem, (), location.tuned.z, share=0.0)
     plain = Left(along=0.0, along_expected=0.0, across=tuned.misfit, across_expected=tuned.expected, force=0.0)
     found = [(plain.at(level).log_likelihood - tuned.prior / 2, plain.at(level).elsewhere)]
-    for one in location.ranked[:PLACES] if len(problem.measured) > 1 else ():
-        beside = profiled(problem, (one.places[0].sites[0],), one.profile.z, share=0.0)
+    for site, z in _leading(problem, location, tuned.z) if len(problem.measured) > 1 else ():
+        beside = profiled(problem, (site,), z, share=0.0)
         left = left_by_force(problem, tuned, beside)
         found.append((left.at(level).log_likelihood - beside.prior / 2, left.at(level).elsewhere))
     return max(found)
+
+
+def _leading(problem: LinearProblem, location: Location, tuned_z: Real) -> list[tuple[Site, Real]]:
+    """The places that explain most with a problem's own holds, each with the parameters to begin a profile at."""
+    starts = [(place.sites[0], tuned_z) for place in location.places]
+    starts += [(one.places[0].sites[0], one.profile.z) for one in location.ranked]
+    leading: dict[Site, Real] = {}
+    for site, z in sorted(starts, key=lambda start: profile_at(problem, start[:1], start[1]).cost):
+        leading.setdefault(site, z)
+    return list(leading.items())[:PLACES]

@@ -39,6 +39,9 @@ class Left:
         Energy of each output over what noise leaves there; empty where outputs aren't told apart.
     along_outputs
         Of `along_expected` each output's; empty where that's all alike.
+    own, own_force
+        ``[site]`` of what is beyond the noise along, and of `force`, what a force at each site is of it. They add up
+        to more than one where forces must work against each other to leave so little; all alike where empty.
     """
 
     along: float
@@ -50,6 +53,8 @@ class Left:
     sites: int = 1
     outputs: tuple[float, ...] = ()
     along_outputs: tuple[float, ...] = ()
+    own: tuple[float, ...] = ()
+    own_force: tuple[float, ...] = ()
 
     def at(self, level: ArrayLike) -> Self:
         """Give the same where the noise has another share of the floor, ``[output]`` or of all."""
@@ -83,11 +88,12 @@ class Left:
     @property
     def unexplained(self) -> float:
         """Nats of what neither noise, wrong as the floor may be, nor usual details of the laws account for."""
-        noise = self.along_expected
-        # Where no force without the laws is known, of windows, no detail is usual.
-        usual = self._usual(OPEN) if np.isfinite(self.force) else 0.0
-        surplus = _beyond_doubt(self.along - noise - usual, self.doubt * noise)
-        return self.elsewhere + _student(surplus, UNUSUAL, usual)
+        found = self.elsewhere
+        for beyond, doubted, force in self._of_sites():
+            # Where no force without the laws is known, of windows, no detail is usual.
+            usual = OPEN**2 * force if np.isfinite(force) else 0.0
+            found += _student(_beyond_doubt(beyond - usual, doubted), UNUSUAL, usual)
+        return found
 
     @property
     def log_likelihood(self) -> float:
@@ -95,17 +101,16 @@ class Left:
 
         Of noise alone it's the misfit. What goes beyond that by D independent numbers of unknown size is
         ``-D ln(1 + misfit/D)`` (Student's distribution: a Gaussian discrepancy whose scale is integrated out): few
-        numbers for usual details of the laws, more for what they leave of their force beyond, most for all else.
+        numbers for usual details of each law, more for what it leaves of its force beyond, most for all else.
         """
-        across, along = self.across_expected, self.along_expected
-        usual = self._usual(USUAL)
-        details = _told(min(self.along - along, usual), self.doubt * along)
-        unusual = _told(self.along - along - usual, self.doubt * along)
-        return -(
-            _student(details, DETAILS * max(self.sites, 1))
-            + (_student(unusual, UNUSUAL, usual) if unusual else 0.0)
-            + _student(_told(self.across - across, self.doubt * across), ELSEWHERE)
-        )
+        across = self.across_expected
+        nats = _student(_told(self.across - across, self.doubt * across), ELSEWHERE)
+        for beyond, doubted, force in self._of_sites():
+            usual = USUAL**2 * force
+            unusual = _told(beyond - usual, doubted)
+            nats += _student(_told(min(beyond, usual), doubted), DETAILS)
+            nats += _student(unusual, UNUSUAL, usual) if unusual else 0.0
+        return -nats
 
     @property
     def flatness(self) -> tuple[float, float]:
@@ -113,12 +118,16 @@ class Left:
 
         Of ``D ln(1 + m/D)`` the curvature is that of m over ``1 + m/D``.
         """
-        along = _told(self.along - self.along_expected, self.doubt * self.along_expected)
+        along = np.mean([_told(beyond, doubted) for beyond, doubted, _ in self._of_sites()])
         across = _told(self.across - self.across_expected, self.doubt * self.across_expected)
-        return 1.0 + along / (DETAILS * max(self.sites, 1)), 1.0 + across / ELSEWHERE
+        return 1.0 + float(along) / DETAILS, 1.0 + across / ELSEWHERE
 
-    def _usual(self, share: float) -> float:
-        return share**2 * max(self.force - self.along_expected, 0.0)
+    def _of_sites(self) -> list[tuple[float, float, float]]:
+        """Of each site the energy beyond the noise, what the noise there is uncertain by, and that of the force."""
+        noise, alike = self.along_expected, (1.0 / max(self.sites, 1),) * max(self.sites, 1)
+        force = max(self.force - noise, 0.0)
+        rows = zip(self.own or alike, self.own_force or alike, strict=True)
+        return [(own * (self.along - noise), own * self.doubt * noise, of * force) for own, of in rows]
 
 
 def _student(energy: float, numbers: float, usual: float = 0.0) -> float:
@@ -164,7 +173,7 @@ def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed:
     residual = lines.spectrum(missed) * weight
     missing = np.asarray((problem.measured - plain.forced()) * weight, dtype=np.complex128)
     (along, across), out = _split(view, measurement.output_names, detailed, weight, residual)
-    (force, _), _ = _split(plain, measurement.output_names, detailed, weight, missing)
+    (force, _), without = _split(plain, measurement.output_names, detailed, weight, missing)
     count, sensors, sites = lines.index.size, len(measurement.output_names), min(len(set(detailed)), len(residual))
     return Left(
         along=along,
@@ -176,7 +185,19 @@ def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed:
         sites=len(set(detailed)),
         outputs=tuple((np.sum(np.abs(residual) ** 2, axis=(1, 2)) / count).tolist()),
         along_outputs=out.taken,
+        own=_shares(out.own(residual), along, sites * count),
+        own_force=_shares(without.own(missing), force, sites * count),
     )
+
+
+def _shares(own: Real, energy: float, noise: float) -> tuple[float, ...]:
+    """Energies of forces as shares of what all of them print together beyond the noise; one alone has all."""
+    whole = float(own.sum())
+    if own.size < 2 or not whole:
+        return ()
+    # Noise prints along all of them as well: of what it hides nothing is known to work against another.
+    against = max((whole + noise) / max(energy, noise), 1.0)
+    return tuple((against * own / whole).tolist())
 
 
 def left_by_force(problem: LinearProblem, tuned: Profile, found: Profile) -> Left:
@@ -192,6 +213,7 @@ def left_by_force(problem: LinearProblem, tuned: Profile, found: Profile) -> Lef
         doubt=doubt_of(problem.noise),
         sites=len(found.sites),
         along_outputs=found.taken,
+        own=_shares(np.array(found.own), tuned.misfit - found.misfit, tuned.expected * share),
     )
 
 

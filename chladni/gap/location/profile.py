@@ -1,13 +1,13 @@
 """Unknown forces profiled out: what is left of a residual when forces at given sites may be anything."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
 from scipy.optimize import lsq_linear
 
-from chladni.gap.calibration import PROFILE_STEPS, RANK, RIDGE, ROUNDING, SHORTER, SLIGHT, ZERO
+from chladni.gap.calibration import MOST_STEPS, PROFILE_STEPS, RANK, RIDGE, ROUNDING, SHORTER, SLIGHT, ZERO
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.signals.arrays import Complex, Real
@@ -37,6 +37,8 @@ class Profile:
         ``z'z``.
     taken
         Of each output the energy of its noise that the forces take; empty without any.
+    own
+        ``[site]`` see `Elimination.own`; empty where that wasn't asked, or of one force alone.
     """
 
     sites: tuple[Site, ...]
@@ -47,6 +49,7 @@ class Profile:
     expected: float
     prior: float
     taken: tuple[float, ...] = ()
+    own: tuple[float, ...] = ()
 
     @property
     def chi(self) -> float:
@@ -134,8 +137,35 @@ class Elimination(Projection):
         transient = np.asarray(scaled * scale[:, None], dtype=np.float64)
         if not len(self._patterns):
             return transient, []
-        left = residual - np.einsum("sol,sm->oml", self._transients[:, :, 0], transient, optimize=True)
-        return transient, list(_forces(self._patterns, left))
+        return transient, list(_forces(self._patterns, self._without(transient, residual)))
+
+    def own(self, residual: Complex) -> Real:
+        """``[site]`` energy that a force at each site prints of a residual, beyond its noise of one.
+
+        Each force is Gaussian, with a power of its own: those that make the residual most probable (variance
+        components by majorising and minimising: Zhou, Hu, Zhou and Lange 2019). Forces that print almost alike may
+        work against each other: then each alone prints far more than all of them together.
+        """
+        if len(self._patterns) < 2:
+            return np.zeros(len(self._patterns))
+        left = self._without(self.unknowns(residual)[0], residual)
+        size = np.sqrt(np.sum(np.abs(self._patterns) ** 2, axis=1, keepdims=True))
+        unit = (self._patterns / np.where(size > 0, size, 1.0))[:, :, 0]
+        gram = np.einsum("aol,bol->lab", unit.conj(), unit)
+        toward = np.einsum("aol,oml->lam", unit.conj(), left)
+        power = np.full(len(unit), float(np.sum(np.abs(left) ** 2)) / left[0].size / len(unit))
+        both = np.concatenate([gram, toward], axis=2)
+        for _ in range(MOST_STEPS):
+            beside = np.linalg.solve(np.eye(len(unit)) + gram * power, both)
+            expected = np.mean(np.einsum("laa->la", beside[..., : len(unit)]).real, axis=0)
+            found = np.mean(np.abs(beside[..., len(unit) :]) ** 2, axis=(0, 2))
+            power = power * np.sqrt(found / np.maximum(expected, ZERO))
+        return np.asarray(power * left[0].size, dtype=np.float64)
+
+    def _without(self, transient: Real, residual: Complex) -> Complex:
+        """A residual but for transients ``[state, segment]``."""
+        printed = np.einsum("sol,sm->oml", self._transients[:, :, 0], transient, optimize=True)
+        return np.asarray(residual - printed, dtype=np.complex128)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,6 +237,12 @@ def profiled(
         if gain < share * (here.misfit - here.expected):
             break
     return best.profile
+
+
+def with_own(problem: LinearProblem, found: Profile) -> Profile:
+    """Give a profile with what each of its forces prints alone."""
+    fit = _fitted(problem, found.sites, found.z)
+    return replace(found, own=tuple(fit.out.own(fit.residual).tolist()))
 
 
 def promises(problem: LinearProblem, sites: Sequence[Site], z: Real, limits: Sequence[Real]) -> list[_Promise]:

@@ -40,7 +40,7 @@ def place(misfit: float, *, places: int = 1, sensors: int = 3):
     expected = (sensors - places) * LINES
     sites = tuple(Site(name=f"j{one}", kind="joint") for one in range(places))
     profile = SimpleNamespace(
-        misfit=misfit * expected, expected=expected, prior=0.0, taken=(), forces=(None,) * places, sites=sites
+        misfit=misfit * expected, expected=expected, prior=0.0, taken=(), own=(), forces=(None,) * places, sites=sites
     )
     return SimpleNamespace(profile=profile, places=tuple(Place(sites=(one,)) for one in sites))
 

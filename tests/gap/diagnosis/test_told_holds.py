@@ -124,6 +124,12 @@ def test_what_is_missing_is_no_hold(effect, hold, seed):
     assert found in {hold, None}
 
 
+def test_a_wrong_hold_does_not_hide_where_the_cause_is():
+    """Half a sample leaves more than a sensor's gain, and elsewhere: the place is looked for with each hold."""
+    gain = attached("gain_error", "a1", {"gain": 0.9})
+    assert told(*made("zoh", "low-passed", 0.01, 0, effects=[gain])) == "zoh"
+
+
 @pytest.mark.nightly
 def test_a_hold_that_the_model_states_is_not_asked_about():
     nominal, log, tunables = made("zoh", "multisine", 0.01, 1)

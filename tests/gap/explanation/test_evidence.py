@@ -119,6 +119,21 @@ def test_each_law_differs_from_the_machine_s_in_its_own_way() -> None:
     assert replace(more, sites=2).log_likelihood == pytest.approx(discrepancy(200.0, 2 * DETAILS), rel=1e-6)
 
 
+def test_laws_whose_details_work_against_each_other_are_not_excused_by_the_force_of_both() -> None:
+    # A tenth of what both laws do, as a share of the RMS: usual, unless each is to err by all of its own force.
+    more = replace(NOISE, along=NOISE.along + 0.01 * NOISE.force, sites=2)
+    against = replace(more, own=(40.0, 60.0), own_force=(0.5, 0.5))
+    assert more.unexplained < 5.0
+    assert against.unexplained > 100.0
+    assert against.log_likelihood < more.log_likelihood - 100.0
+    # Nor is a small law excused by a large one's.
+    small = replace(more, own=(0.01, 0.99), own_force=(0.99, 0.01))
+    assert small.unexplained > 30.0
+    assert replace(more, own=(0.99, 0.01), own_force=(0.99, 0.01)).unexplained < 5.0
+    # With nothing but noise there is nothing to excuse.
+    assert replace(NOISE, sites=2, own=(40.0, 60.0)).log_likelihood == 0.0
+
+
 @pytest.fixture(scope="module")
 def sprung():
     """Three bodies with a spring between two of them that hardens, beside the fit that knows of none."""

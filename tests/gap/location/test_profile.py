@@ -153,3 +153,24 @@ def test_slopes_that_are_alike_but_for_rounding_still_have_a_minimum():
     assert free[:2].sum() == pytest.approx(1.0, rel=1e-6)
     bound = bounded_minimum(normal, slopes @ rest, np.full(3, -9.0), np.array([0.25, 0.5, 9.0]))
     np.testing.assert_allclose(bound[:2], [0.25, 0.5], rtol=1e-9)
+
+
+@pytest.mark.parametrize("angle", [np.pi / 2, 0.05])
+def test_a_force_s_own_energy_is_what_it_prints_alone(angle):
+    # Two sensors, two forces that print at an angle, four times and thrice the noise; then both against each other.
+    rng = np.random.default_rng(0)
+    lines, size = 2000, 1 / np.sqrt(2)
+    patterns = np.array([[1.0, 0.0], [np.cos(angle), np.sin(angle)]])[:, :, None, None] * np.ones((1, 2, 1, lines))
+    white = (rng.standard_normal((5, lines)) + 1j * rng.standard_normal((5, lines))) * size
+    noise, pushes = white[:2], np.array([40.0, 30.0])[:, None] * white[2:4]
+    out = Elimination(patterns, np.zeros((1, 2, 1, lines), dtype=complex))
+    both = np.einsum("sol,sl->ol", patterns[:, :, 0], pushes) + noise
+    own = out.own(both[:, None])
+    np.testing.assert_allclose(own, [40.0**2 * lines, 30.0**2 * lines], rtol=0.1)
+    # What only their difference prints is small beside each of them, where they print almost alike.
+    apart = patterns[0, :, 0] - patterns[1, :, 0]
+    against = out.own((600.0 * apart * white[4] + noise)[:, None])
+    whole = np.sum(np.abs(600.0 * apart * white[4]) ** 2)
+    assert (against.sum() > 100.0 * whole) == (angle < 1.0)
+    # Noise has neither.
+    assert out.own(noise[:, None]).sum() < 0.1 * 2 * lines
