@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from chladni.gap.calibration import NAMED
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Closing, Diagnosis, FittedNumber
 from chladni.gap.records.measurement import LogUse
 from chladni.gap.records.robot import site_words
@@ -45,7 +46,7 @@ def caveats(found: Diagnosis) -> tuple[str, ...]:
     causes = found.causes if found.verdict in ("effect", "parameters") else ()
     told = {
         *_faint(found),
-        *(one for cause in causes for one in _reservations(cause)),
+        *(one for cause in causes for one in _reservations(found, cause)),
         *(_too_near(found.gap) if causes else ()),
         *_elsewhere(found),
         *_how(found),
@@ -108,7 +109,7 @@ def _effects(found: Diagnosis) -> Iterator[str]:
     yield from _any_law(found)
     yield from _faint(found)
     for cause in causes:
-        yield from _reservations(cause)
+        yield from _reservations(found, cause)
 
 
 def _any_law(found: Diagnosis) -> Iterator[str]:
@@ -193,13 +194,16 @@ def _carried(here: Closing, there: Closing) -> str:
     return ""
 
 
-def _reservations(cause: Cause) -> Iterator[str]:
+def _reservations(found: Diagnosis, cause: Cause) -> Iterator[str]:
     others = [site_words(site) for site in cause.group if site != cause.site]
     if others:
         yield f"These sensors can't tell {site_words(cause.site)} from {listed(others, word='or')}."
     if cause.alternatives:
         told = listed([effect_at(one.effect, one.site) for one in cause.alternatives], word="or")
-        yield f"This log can't tell {effect_heading(cause.effect)} at {site_words(cause.site)} from {told}."
+        word = sum(one.probability for one in found.ranking if one.effect == cause.effect and one.site in cause.group)
+        # A word that is less probable than not by itself is told for those of its family, too.
+        whose = f": {chance(cause.probability)} is that of all of them" if 0.0 < word < NAMED else ""
+        yield f"This log can't tell {effect_heading(cause.effect)} at {site_words(cause.site)} from {told}{whose}."
 
 
 def _parameters(found: Diagnosis) -> Iterator[str]:
@@ -215,7 +219,7 @@ def _parameters(found: Diagnosis) -> Iterator[str]:
         f"noise {percent(gap.noise)}."
     )
     for cause in wrong:
-        yield from _reservations(cause)
+        yield from _reservations(found, cause)
 
 
 def _wrong_value(cause: Cause, found: Diagnosis) -> str:

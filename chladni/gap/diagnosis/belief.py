@@ -8,7 +8,7 @@ from math import comb
 
 import numpy as np
 
-from chladni.gap.calibration import ANOTHER, CLOSE, DETAILS, LAPSE, LEAST_SHARE, TEMPER
+from chladni.gap.calibration import ANOTHER, CLOSE, DETAILS, LAPSE, LEAST_SHARE, NAMED, TEMPER
 from chladni.gap.explanation.evidence import Left, doubt_of, highest_level, left_by_force
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.location.locate import Located, Location
@@ -66,6 +66,7 @@ class Belief:
         problem = location.problem
         sites = [site.kind for site in sites_of(problem.model.compile(), problem.measurement.output_names)]
         self._kinds = Counter(sites)
+        self._family = {kind.name: kind.family for kind in kinds}
         #: Nats of one more cause: that there is one, and that it's this word at this site.
         self.word = float(np.log(ANOTHER) - np.log(max(sum(kind in one.sites for one in kinds for kind in sites), 1)))
         self.value = float(np.log(ANOTHER) - np.log(max(len(problem.tunables.names), 1)))
@@ -221,13 +222,27 @@ class Belief:
         wanted = set(candidates)
         return float(sum(one.probability for one in self.sets if not wanted.isdisjoint(one.causes)))
 
-    def alike(self, cause: Candidate) -> tuple[Candidate, ...]:
-        """Give a cause of the first set, with the same word at sites that the log can't tell from its own."""
+    def in_its_place(self, cause: Candidate) -> tuple[Candidate, ...]:
+        """Give a cause of the first set, then what could stand in its place as far as the log can tell."""
         first = self.sets[0]
         near = [one for one in self.sets if one.nats > first.nats - CLOSE and len(one.causes) == len(first.causes)]
         rest = first.causes - {cause}
         others = [each for one in near if rest < one.causes for each in one.causes - rest]
-        return tuple(dict.fromkeys([cause, *(each for each in others if each.effect == cause.effect)]))
+        return tuple(dict.fromkeys([cause, *others]))
+
+    def alike(self, cause: Candidate) -> tuple[Candidate, ...]:
+        """Give the narrowest group that is more probable than not and that the log can't tell from a cause.
+
+        That is its word at all sites that could be its own, or, where none of the words there has half of it, those
+        of the same family with it.
+        """
+        others = self.in_its_place(cause)
+        word = tuple(one for one in others if one.effect == cause.effect)
+        if self.probability(*word) >= NAMED:
+            return word
+        sites, family = {one.site for one in word}, self._family.get(cause.effect)
+        like = (one for one in others if one.site in sites and self._family.get(one.effect) == family is not None)
+        return tuple(dict.fromkeys([*word, *like]))
 
     def answer_set(self, coverage: float) -> tuple[Candidate, ...]:
         """Give effects and sites that together hold the truth with some probability, the most probable first."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from chladni.gap.calibration import CLOSE, NAMED, UNWEIGHED, ZERO
+from chladni.gap.calibration import NAMED, UNWEIGHED, ZERO
 from chladni.gap.diagnosis.closing import explained_power
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.diagnosis.verdict import Causes
@@ -71,7 +71,7 @@ def ranking_of(causes: Causes, causes_said: Sequence[Cause]) -> tuple[Ranked, ..
     for one in reversed(causes.ranked):
         for candidate in one.hypothesis.named:
             key = (candidate.effect, candidate.site)
-            own = probability_of(causes, candidate)
+            own = causes.belief.probability(candidate)
             rows[key] = Ranked(
                 effect=key[0],
                 site=key[1],
@@ -107,16 +107,15 @@ def tuned_numbers(study: Study, fit: OutputErrorFit) -> dict[str, FittedNumber]:
 def _cause(study: Study, causes: Causes, place: int) -> Cause:
     best = causes.best
     candidate = best.hypothesis.named[place]
-    near = _in_its_place(causes, candidate)
-    group = dict.fromkeys([candidate.site, *(one.site for one in near if one.effect == candidate.effect)])
+    alike = causes.belief.alike(candidate)
     effect = best.fit.effects[place] if place < len(best.fit.effects) else None
     return Cause(
         effect=candidate.effect,
         site=candidate.site,
-        # Of the word at any of the sites that it's told for.
-        probability=probability_of(causes, *(replace(candidate, site=site) for site in group)),
-        group=tuple(group),
-        alternatives=tuple(dict.fromkeys(one for one in near if one.effect != candidate.effect)),
+        # Of the word at any of the sites that it's told for, or of all words that it's told with.
+        probability=causes.belief.probability(*alike),
+        group=tuple(one.site for one in alike if one.effect == candidate.effect),
+        alternatives=tuple(one for one in causes.belief.in_its_place(candidate) if one.effect != candidate.effect),
         parameters=_numbers(study, best, place),
         variant=effect.variant if effect is not None else None,
         source=effect.source if effect is not None else None,
@@ -127,24 +126,6 @@ def _left_alone(causes: Causes, place: int) -> float:
     """Least that one of the believed causes leaves when it's the only one."""
     candidate = causes.best.hypothesis.named[place]
     return min((one.chi for one in causes.ranked if one.hypothesis.named == (candidate,)), default=np.inf)
-
-
-def _in_its_place(causes: Causes, candidate: Candidate) -> list[Candidate]:
-    """What could stand in a cause's place beside the other causes, as far as this log can tell."""
-    best = causes.best
-    kept = {one for one in best.hypothesis.named if one != candidate}
-    found = []
-    for one in causes.ranked:
-        named = one.hypothesis.named
-        close = causes.belief.nats(one) > causes.belief.nats(best) - CLOSE
-        if close and len(named) == len(best.hypothesis.named) and kept.issubset(named):
-            found += [other for other in named if other not in kept]
-    return found
-
-
-def probability_of(causes: Causes, *candidates: Candidate) -> float:
-    """Probability of a word at one of some sites, all forms of its law and all that it stands beside together."""
-    return causes.belief.probability(*candidates)
 
 
 def _numbers(study: Study, found: Contestant, place: int) -> dict[str, FittedNumber]:

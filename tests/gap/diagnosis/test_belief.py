@@ -229,6 +229,22 @@ def test_a_group_is_as_probable_as_all_sets_with_any_of_it() -> None:
     assert belief.probability(replace(rub, site="j2")) == 0.0
 
 
+def test_a_name_is_as_narrow_as_the_log_allows() -> None:
+    lag, delay, rub = (Candidate(effect=one.effect, site=one.site) for one in (LAG, DELAY, RUB))
+    elsewhere = replace(rub, site="j2")
+
+    def alike(cause: Candidate, *shares: float) -> tuple[Candidate, ...]:
+        made = (LAG, DELAY, RUB, replace(RUB, site="j2"))
+        rows = zip(made, shares, strict=False)
+        belief = Belief(location(), weighed(*((contestant(one), share) for one, share in rows if share)))
+        return belief.alike(cause)
+
+    assert alike(lag, 0.6, 0.4) == (lag,)
+    assert alike(lag, 0.4, 0.35, 0.25) == (lag, delay)
+    # A word at several sites is one word.
+    assert alike(rub, 0.25, 0.0, 0.4, 0.35) == (rub, elsewhere)
+
+
 def test_a_force_of_any_shape_is_believed_where_no_law_explains_what_it_does() -> None:
     # A gap of a hundred times the noise, of which the word leaves a tenth and a force at one place nothing.
     where, nothing = location([place(1.0)], misfit=100.0), contestant(left=leaving(100.0))
@@ -286,7 +302,9 @@ def test_where_nothing_was_found_to_act_no_force_is_believed() -> None:
         ({"value": 0.6, "nothing": 0.4}, "parameters"),
         ({"both": 0.6, "nothing": 0.4}, "effect"),
         # The likeliest, but as likely wrong as right: no name.
-        ({"lag": 0.4, "delay": 0.3, "nothing": 0.3}, "unknown"),
+        ({"lag": 0.4, "rub": 0.3, "nothing": 0.3}, "unknown"),
+        # But both are ways to be late at one place.
+        ({"lag": 0.4, "delay": 0.3, "nothing": 0.3}, "effect"),
         # Neither set is, but what they have in common is.
         ({"lag and rub": 0.4, "lag": 0.3, "nothing": 0.3}, "effect"),
     ],
@@ -296,6 +314,7 @@ def test_a_name_is_given_when_it_is_more_probable_than_not(shares, verdict) -> N
         "nothing": contestant(),
         "lag": contestant(LAG),
         "delay": contestant(DELAY),
+        "rub": contestant(RUB),
         "lag and rub": contestant(LAG, RUB),
         "value": contestant(freed=("j1.stiffness",)),
         "both": contestant(LAG, freed=("j1.stiffness",)),
