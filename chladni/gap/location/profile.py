@@ -154,11 +154,15 @@ class Elimination(Projection):
         gram = np.einsum("aol,bol->lab", unit.conj(), unit)
         toward = np.einsum("aol,oml->lam", unit.conj(), left)
         power = np.full(len(unit), float(np.sum(np.abs(left) ** 2)) / left[0].size / len(unit))
-        both = np.concatenate([gram, toward], axis=2)
         for _ in range(MOST_STEPS):
-            beside = np.linalg.solve(np.eye(len(unit)) + gram * power, both)
-            expected = np.mean(np.einsum("laa->la", beside[..., : len(unit)]).real, axis=0)
-            found = np.mean(np.abs(beside[..., len(unit) :]) ** 2, axis=(0, 2))
+            root = np.sqrt(power)
+            # Over the noise of one; where forces print alike, rounding makes a bit less than nothing of what differs.
+            printed, shapes = np.linalg.eigh(root[:, None] * gram * root)
+            printed = np.maximum(printed, 0.0)
+            beside = np.einsum("lka,lam->lkm", shapes.conj().swapaxes(1, 2), root[:, None] * toward)
+            beside = np.einsum("lak,lkm->lam", shapes, beside / (1.0 + printed)[:, :, None])
+            expected = np.mean(np.einsum("lak,lk->la", np.abs(shapes) ** 2, printed / (1.0 + printed)), axis=0)
+            found = np.mean(np.abs(beside) ** 2, axis=(0, 2))
             power = power * np.sqrt(found / np.maximum(expected, ZERO))
         return np.asarray(power * left[0].size, dtype=np.float64)
 

@@ -174,3 +174,12 @@ def test_a_force_s_own_energy_is_what_it_prints_alone(angle):
     assert (against.sum() > 100.0 * whole) == (angle < 1.0)
     # Noise has neither.
     assert out.own(noise[:, None]).sum() < 0.1 * 2 * lines
+
+
+def test_forces_that_print_the_same_share_what_they_print_however_much_it_is():
+    # A run that left the machine's: rounding takes the noise of one beside it.
+    patterns = np.ones((2, 2, 1, 50)) * np.array([1.0, 0.5])[:, None, None]
+    out = Elimination(patterns, np.zeros((1, 2, 1, 50), dtype=complex))
+    for size in (1e2, 1e9, 1e12):
+        own = out.own(size * patterns[0].astype(complex))
+        assert own.sum() == pytest.approx(50 * 1.25 * size**2, rel=1e-3)
