@@ -202,7 +202,7 @@ def _reservations(found: Diagnosis, cause: Cause) -> Iterator[str]:
         told = listed([effect_at(one.effect, one.site) for one in cause.alternatives], word="or")
         word = sum(one.probability for one in found.ranking if one.effect == cause.effect and one.site in cause.group)
         # A word that is less probable than not by itself is told for those of its family, too.
-        whose = f": {chance(cause.probability)} is that of all of them" if 0.0 < word < NAMED else ""
+        whose = f": {chance(cause.probability)} is that of its family there" if 0.0 < word < NAMED else ""
         yield f"This log can't tell {effect_heading(cause.effect)} at {site_words(cause.site)} from {told}{whose}."
 
 

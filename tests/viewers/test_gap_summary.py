@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from chladni.gap.records.diagnosis import AnyLaw, Candidate, Cause, FittedNumber, PairShare
+from chladni.gap.records.diagnosis import AnyLaw, Candidate, Cause, FittedNumber, PairShare, Ranked
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.viewers import gap_tables as tables
 from chladni.viewers.effect_words import cause_law, cause_phrase, effect_at, effect_heading, effect_name
@@ -120,6 +120,14 @@ def test_sites_and_effects_that_cant_be_told_apart_are_named() -> None:
     said = summary(made.indistinguishable())
     assert "These sensors can't tell elbow from shoulder." in said
     assert "This log can't tell Coulomb friction at elbow from hysteresis at elbow." in said
+
+
+def test_a_word_that_is_told_for_its_family_says_whose_the_probability_is() -> None:
+    found = made.indistinguishable()
+    cause = replace(found.causes[0], probability=0.62)
+    row = Ranked(effect=cause.effect, site=cause.site, probability=0.4, gap=None, log_evidence=None)
+    said = " ".join(summary(replace(found, causes=(cause,), ranking=(row,))))
+    assert "from hysteresis at elbow: 62 % is that of its family there." in said
 
 
 def test_nothing_missing_is_told_with_what_was_tuned() -> None:
