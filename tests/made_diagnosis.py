@@ -276,9 +276,15 @@ def agreeing() -> Diagnosis:
     found = diagnosis()
     gap = replace(found.gap, before=0.012, tuned=0.0103, after=0.0103, noise=0.0101, closed=None, interval=None)
     gap = replace(gap, explained=None)
-    return replace(
-        found, verdict="none", causes=(), gap=gap, next_measurement=None, naive=None, restoring_forces=(), ranking=()
+    # Nothing acts anywhere; what was looked at, and what was recovered there, is in the record all the same.
+    where = replace(found.where, sites=tuple(replace(one, share=0.0) for one in found.where.sites))
+    noise = replace(
+        restoring_force(), force=restoring_force().force - rubbing_run().motion("elbow").force, law_force=None
     )
+    return replace(
+        found, verdict="none", causes=(), gap=gap, where=where, next_measurement=None, naive=None,
+        restoring_forces=(noise,), ranking=(),
+    )  # fmt: skip
 
 
 def wrong_values() -> Diagnosis:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.apps.gap_comparison import GapComparison, comparison_document
+from chladni.apps.gap_comparison import GapComparison, comparison_document, noise_told
 from chladni.apps.gap_document import Document
 from chladni.gap.calibration import ALIKE
 from chladni.gap.comparison.levels import compare_levels
@@ -72,7 +72,7 @@ def _growth(comparisons: Sequence[GapComparison]) -> tuple[str, ...]:
     low_level, high_level = (_level(one, name) for one in (low, high))
     if high_level < ALIKE * low_level:
         return ()
-    first, last = (f"{percent(one.gap)} (noise {percent(one.noise)})" for one in (low, high))
+    first, last = (f"{percent(one.gap)} (noise {noise_told(one)})" for one in (low, high))
     return (f"the gap is {first} at {low_level:.3g} RMS of {name}, {last} at {high_level:.3g}",)
 
 

@@ -21,7 +21,7 @@ from chladni.signals.join import JoinMethod
 from chladni.signals.number_range import rms
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted
-from chladni.viewers.engineering import percent
+from chladni.viewers.engineering import bounded_percent, percent
 
 COMPARISON_FORMAT: Final = "chladni.gap-comparison/1"
 # What differs by less than this share of its RMS was played back, not simulated: digits of a CSV, single precision.
@@ -129,7 +129,7 @@ def compare_with_simulated(
 
 def answer(found: GapComparison) -> tuple[str, ...]:
     """Give what is said first: how far the simulation is from the log, and what was taken for inputs."""
-    first = f"{found.simulated} is {percent(found.gap)} from {found.measured}, noise {percent(found.noise)}."
+    first = f"{found.simulated} is {percent(found.gap)} from {found.measured}, noise {noise_told(found)}."
     moving = moving_inputs(found.pair[0])
     still = len(found.inputs) - len(moving)
     if not moving:
@@ -137,6 +137,11 @@ def answer(found: GapComparison) -> tuple[str, ...]:
     # Messages hold axes that nothing drives; their names would hide the one that counts.
     beside = f" ({counted(still, 'other channel')} that stand{'s' if still == 1 else ''} still)" if still else ""
     return (first, f"The same in both, taken for inputs: {', '.join(moving)}{beside}.")
+
+
+def noise_told(found: GapComparison) -> str:
+    """Give the noise as a share, at most so much where that of an output is a bound."""
+    return bounded_percent(found.noise, at_most=any(one.noise_at_most for one in found.where.channels))
 
 
 def comparison_document(found: GapComparison) -> Document:

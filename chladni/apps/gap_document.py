@@ -74,7 +74,7 @@ def where_document(where: Where) -> Document:
                 "name": one.name,
                 "gap": _known(one.gap),
                 "noise": _known(one.noise),
-                **_when_there({"noise_from": one.noise_from or None}),
+                **_when_there({"noise_from": one.noise_from or None, "noise_at_most": one.noise_at_most or None}),
             }
             for one in where.channels
         ],
@@ -128,7 +128,8 @@ def closing_document(gap: Closing) -> Document:
     if gap.by != "free_run":
         document["by"] = gap.by
     known = {"horizon_s": gap.horizon_s, "explained": gap.explained, "after_over_noise": gap.after_over_noise}
-    return document | _when_there({key: _known(number) for key, number in known.items()})
+    at_most = {"noise_at_most": gap.noise_at_most or None}
+    return document | _when_there({**{key: _known(number) for key, number in known.items()}, **at_most})
 
 
 def _cause(cause: Cause) -> Document:
@@ -140,7 +141,14 @@ def _cause(cause: Cause) -> Document:
         "alternatives": [_candidate(one) for one in cause.alternatives],
         "parameters": {name: _number(number) for name, number in cause.parameters.items()},
         # "from" as in model files, where a cause may be pasted.
-        **_when_there({"variant": cause.variant, "from": cause.source, "share": _known(cause.share)}),
+        **_when_there(
+            {
+                "variant": cause.variant,
+                "from": cause.source,
+                "share": _known(cause.share),
+                "probability_of": list(cause.probability_of),
+            }
+        ),
     }
 
 

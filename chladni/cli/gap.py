@@ -411,9 +411,10 @@ def _serve(out: Output, found: "Diagnosis", model: "Model | Robot") -> None:
 def _sketch(found: "Diagnosis", model: "Model | Robot") -> "StructureSketch | None":
     from chladni.apps.gap_structure import structure_sketch
     from chladni.robots.robot import Robot
+    from chladni.viewers.gap_tables import places_of
 
     # A structure coloured by nothing would look like one that can't explain the gap anywhere.
-    return None if isinstance(model, Robot) or not found.where.sites else structure_sketch(model, found.where)
+    return None if isinstance(model, Robot) or not places_of(found.where) else structure_sketch(model, found.where)
 
 
 def _scene(found: "Diagnosis") -> "RobotScene | None":

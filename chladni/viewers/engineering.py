@@ -92,6 +92,17 @@ def percent(share: float) -> str:
     return f"{value:.{min(max(0, 1 - floor(log10(abs(rounded)))), 6)}f} %"
 
 
+def bounded_percent(share: float, *, at_most: bool) -> str:
+    """Print a share, and that it's a bound where it is one.
+
+    Examples
+    --------
+    >>> bounded_percent(0.068, at_most=True), bounded_percent(0.011, at_most=False)
+    ('at most 6.8 %', '1.1 %')
+    """
+    return f"at most {percent(share)}" if at_most else percent(share)
+
+
 def signed_percent(share: float) -> str:
     """Print a change as a share, with its sign.
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 
-from chladni.gap.calibration import NAMED
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Closing, Diagnosis, FittedNumber
 from chladni.gap.records.measurement import LogUse
 from chladni.gap.records.robot import site_words
+from chladni.signals.wording import counted
 from chladni.viewers.effect_words import cause_phrase, effect_at, effect_heading
-from chladni.viewers.engineering import chance, engineering, percent
+from chladni.viewers.engineering import bounded_percent, chance, engineering, percent
+from chladni.viewers.gap_tables import places_of
 from chladni.viewers.robot_summary import IN_A_SENTENCE, listed, robot_sentences, robot_unknown
 
 # Above the first one says "most likely", above the second "probably", else "perhaps".
@@ -46,7 +47,7 @@ def caveats(found: Diagnosis) -> tuple[str, ...]:
     causes = found.causes if found.verdict in ("effect", "parameters") else ()
     told = {
         *_faint(found),
-        *(one for cause in causes for one in _reservations(found, cause)),
+        *(one for cause in causes for one in _reservations(cause)),
         *(_too_near(found.gap) if causes else ()),
         *_elsewhere(found),
         *_how(found),
@@ -79,6 +80,7 @@ def _sentences(found: Diagnosis) -> Iterator[str]:
             yield from _parameters(found)
         case "none":
             yield f"Nothing is missing: {_agreement(found.gap)}."
+            yield from _nowhere(found)
             yield from _moved(found)
         case "unknown":
             yield from _unknown(found) if found.machine is None else robot_unknown(found)
@@ -109,7 +111,7 @@ def _effects(found: Diagnosis) -> Iterator[str]:
     yield from _any_law(found)
     yield from _faint(found)
     for cause in causes:
-        yield from _reservations(found, cause)
+        yield from _reservations(cause)
 
 
 def _any_law(found: Diagnosis) -> Iterator[str]:
@@ -136,7 +138,8 @@ def _any_law(found: Diagnosis) -> Iterator[str]:
 
 def _faint(found: Diagnosis) -> Iterator[str]:
     if found.gap.before < FAINT * found.gap.noise:
-        yield f"The gap is faint: the error is {found.gap.before / found.gap.noise:.2g} times the noise."
+        noise = "what noise may be" if found.gap.noise_at_most else "the noise"
+        yield f"The gap is faint: the error is {found.gap.before / found.gap.noise:.2g} times {noise}."
 
 
 _COUNT = {2: "two", 3: "three", 4: "four"}
@@ -158,7 +161,7 @@ def _closing(found: Diagnosis) -> str:
     adding = "adding it brings" if len(found.causes) == 1 else "adding them brings"
     # Tables of the whole log show other numbers.
     brings = f"{adding} the error from {percent(gap.before)} to {percent(gap.after)} on stretches that no fit saw"
-    text = f"{explained}{brings}, noise {percent(gap.noise)}."
+    text = f"{explained}{brings}, noise {_noise(gap)}."
     return text if explained else text[0].upper() + text[1:]
 
 
@@ -181,7 +184,7 @@ def _elsewhere(found: Diagnosis) -> Iterator[str]:
     """Other logs, judged with what the first one told."""
     for gap in found.elsewhere:
         log = gap.held_out[0].log if gap.held_out else "another log"
-        brings = f"from {percent(gap.before)} to {percent(gap.after)}, noise {percent(gap.noise)}"
+        brings = f"from {percent(gap.before)} to {percent(gap.after)}, noise {_noise(gap)}"
         yield f"On {log}, which nothing was fitted to, the error goes {brings}{_carried(found.gap, gap)}."
 
 
@@ -194,15 +197,13 @@ def _carried(here: Closing, there: Closing) -> str:
     return ""
 
 
-def _reservations(found: Diagnosis, cause: Cause) -> Iterator[str]:
+def _reservations(cause: Cause) -> Iterator[str]:
     others = [site_words(site) for site in cause.group if site != cause.site]
     if others:
         yield f"These sensors can't tell {site_words(cause.site)} from {listed(others, word='or')}."
     if cause.alternatives:
         told = listed([effect_at(one.effect, one.site) for one in cause.alternatives], word="or")
-        word = sum(one.probability for one in found.ranking if one.effect == cause.effect and one.site in cause.group)
-        # A word that is less probable than not by itself is told for those of its family, too.
-        whose = f": {chance(cause.probability)} is that of its family there" if 0.0 < word < NAMED else ""
+        whose = f": {chance(cause.probability)} is that of its family there" if cause.probability_of else ""
         yield f"This log can't tell {effect_heading(cause.effect)} at {site_words(cause.site)} from {told}{whose}."
 
 
@@ -216,10 +217,10 @@ def _parameters(found: Diagnosis) -> Iterator[str]:
     gap = found.gap
     yield (
         f"With that the error falls from {percent(gap.before)} to {percent(gap.after)} on stretches that no fit saw, "
-        f"noise {percent(gap.noise)}."
+        f"noise {_noise(gap)}."
     )
     for cause in wrong:
-        yield from _reservations(found, cause)
+        yield from _reservations(cause)
 
 
 def _wrong_value(cause: Cause, found: Diagnosis) -> str:
@@ -237,6 +238,13 @@ def _against_nominal(number: FittedNumber) -> str:
     return f"{told} where the model has {engineering(number.nominal, None, number.unit)}"
 
 
+def _nowhere(found: Diagnosis) -> Iterator[str]:
+    """That places were looked at, where tables and pictures of them would be of zeros."""
+    if found.where.sites and not places_of(found.where):
+        count = counted(len({frozenset((one.name, *one.group)) for one in found.where.sites}), "place")
+        yield f"No force, error or change at any of {count} explains anything beyond the noise."
+
+
 def _moved(found: Diagnosis) -> Iterator[str]:
     """The tuned value that lies farthest from its nominal, in words; tables hold the others."""
     moved = {
@@ -251,14 +259,18 @@ def _moved(found: Diagnosis) -> Iterator[str]:
 
 def _agreement(gap: Closing) -> str:
     tuned = "" if gap.tuned == gap.before else f" ({percent(gap.before)} before its parameters were tuned)"
-    return f"the model's error is {percent(gap.after)}{tuned}, the noise {percent(gap.noise)}"
+    return f"the model's error is {percent(gap.after)}{tuned}, the noise {_noise(gap)}"
+
+
+def _noise(gap: Closing) -> str:
+    return bounded_percent(gap.noise, at_most=gap.noise_at_most)
 
 
 def _unknown(found: Diagnosis) -> Iterator[str]:
     gap = found.gap
     yield (
         f"There is a gap that no known effect explains: the best parameters leave an error of {percent(gap.tuned)} "
-        f"({percent(gap.before)} before), noise {percent(gap.noise)}."
+        f"({percent(gap.before)} before), noise {_noise(gap)}."
     )
     where = found.left or found.where
     told = []

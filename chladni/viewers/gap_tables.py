@@ -7,7 +7,16 @@ from math import inf
 from chladni.gap.records.diagnosis import Cause, Diagnosis, DistortionShare, FittedNumber, Ranked, Where
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.viewers.effect_words import NOT_DETERMINED, cause_heading, effect_heading, printed_number
-from chladni.viewers.engineering import SURE, chance, engineering, percent, signed_percent, span
+from chladni.viewers.engineering import (
+    NOTHING,
+    SURE,
+    bounded_percent,
+    chance,
+    engineering,
+    percent,
+    signed_percent,
+    span,
+)
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
@@ -32,7 +41,9 @@ NOISE_FROM = {
 def channel_table(where: Where) -> Table:
     """Gap and noise of each output, over its own RMS; the largest first."""
     rows = sorted(where.channels, key=lambda one: -one.gap)
-    return ("Output", "Gap", "Noise"), [(one.name, percent(one.gap), percent(one.noise)) for one in rows]
+    return ("Output", "Gap", "Noise"), [
+        (one.name, percent(one.gap), bounded_percent(one.noise, at_most=one.noise_at_most)) for one in rows
+    ]
 
 
 def noise_told(where: Where) -> str | None:
@@ -75,6 +86,13 @@ def site_title(found: Diagnosis, model: str = "What one site alone can explain")
     return model if found.machine is None else "Of the torque that is missing, by joint"
 
 
+def force_title(found: Diagnosis, site: str) -> str:
+    """Title of a restoring force: where nothing is missing it's no evidence of a site."""
+    if found.verdict == "none":
+        return f"Force recovered at {site}: nothing is missing, this is noise and what tuning moved"
+    return f"Force that the model lacks at {site}"
+
+
 def sites_named(found: Diagnosis) -> set[str]:
     """Sites of the causes; both of a pair."""
     return {site for cause in found.causes for site in (cause.site, *cause.site.split("~"))}
@@ -90,7 +108,12 @@ def site_table(where: Where, *, count: int | None = None) -> Table:
 
 
 def places_of(where: Where) -> list[tuple[tuple[str, ...], float]]:
-    """Sites that these sensors can't tell apart, put together, with their share; the largest first."""
+    """Sites that these sensors can't tell apart, put together, with their share; the largest first.
+
+    None where no site explains anything: a list of zeros would look like a place.
+    """
+    if not any(one.share >= NOTHING for one in where.sites):
+        return []
     found: dict[frozenset[str], tuple[tuple[str, ...], float]] = {}
     for one in sorted(where.sites, key=lambda one: -one.share):
         names = (one.name, *one.group)

@@ -44,6 +44,11 @@ def test_the_gap_is_what_the_simulation_leaves(logs: tuple[Path, Path]) -> None:
     assert found.inputs == ("/shaker.wrench.force.x",)
     assert {channel.name for channel in found.where.channels} == {"/column.accel.linear.x", "/wrist.accel.linear.x"}
     assert found.noise < found.gap
+    first, *others = found.where.channels
+    for bound, told in ((False, "noise "), (True, "noise at most ")):
+        sure = (replace(one, noise_at_most=False) for one in others)
+        where = replace(found.where, channels=(replace(first, noise_at_most=bound), *sure))
+        assert answer(replace(found, where=where))[0].endswith(f"{told}{percent(found.noise)}.")
     assert found.where.sites == ()
 
 

@@ -73,17 +73,24 @@ MORE = {
         "set",
         "coverage",
     },
-    ".causes": {"variant", "from", "share"},
+    ".causes": {"variant", "from", "share", "probability_of"},
     ".ranking": {"beside"},
-    ".where.channels": {"noise_from"},
+    ".where.channels": {"noise_from", "noise_at_most"},
     ".where.bands": {"noise"},
     ".where": {"pair"},
     ".where.sites": {"group"},
     ".where.regimes": {"time"},
-    ".gap": {"by", "horizon_s", "explained", "after_over_noise"},
+    ".gap": {"by", "horizon_s", "explained", "after_over_noise", "noise_at_most"},
 }
 # Of some of these: what their values may be.
-KINDS_OF_MORE: Mapping[str, Any] = {".set": [CANDIDATE], ".coverage": NUMBER, ".gap.after_over_noise": NUMBER}
+KINDS_OF_MORE: Mapping[str, Any] = {
+    ".set": [CANDIDATE],
+    ".coverage": NUMBER,
+    ".gap.after_over_noise": NUMBER,
+    ".gap.noise_at_most": (bool,),
+    ".where.channels.noise_at_most": (bool,),
+    ".causes.probability_of": [(str,)],
+}
 KINDS = made.every_kind()
 
 
@@ -182,6 +189,27 @@ def test_groups_and_alternatives_are_lists_of_names_and_candidates() -> None:
     (cause,) = written(made.indistinguishable())["causes"]
     assert cause["group"] == ["elbow", "shoulder"]
     assert cause["alternatives"] == [{"effect": "hysteresis", "site": "elbow"}]
+
+
+def test_a_probability_that_a_family_shares_names_its_words() -> None:
+    family = ("coulomb_friction", "hysteresis")
+    (plain,) = written(made.indistinguishable())["causes"]
+    assert "probability_of" not in plain
+    shared = replace(made.diagnosis(), causes=(made.friction(probability=0.62, probability_of=family),))
+    assert strays(written(shared), SCHEMA) == []
+    (cause,) = written(shared)["causes"]
+    assert (cause["effect"], cause["probability_of"]) == ("coulomb_friction", list(family))
+
+
+def test_noise_that_is_a_bound_is_marked_as_one() -> None:
+    found = made.diagnosis()
+    assert "noise_at_most" not in written(found)["gap"]
+    first, *others = found.where.channels
+    where = replace(found.where, channels=(replace(first, noise_at_most=True), *others))
+    document = written(replace(found, gap=replace(found.gap, noise_at_most=True), where=where))
+    assert strays(document, SCHEMA) == []
+    assert document["gap"]["noise_at_most"] is True
+    assert [one.get("noise_at_most") for one in document["where"]["channels"]] == [True, None]
 
 
 def test_how_it_was_measured_is_told_only_where_it_was_not_by_free_run() -> None:

@@ -285,6 +285,22 @@ def test_without_shares_of_sites_the_other_bars_are_drawn() -> None:
     assert not any("site" in axes.get_title(loc="left") for axes in gap_sheet(one_sensor).axes)
 
 
+def test_where_nothing_is_missing_no_picture_says_that_something_is() -> None:
+    evidence = gap_evidence(made.agreeing())
+    drawn = gap_album(evidence).figures
+    force = drawn["restoring force"].get_suptitle()
+    assert force == "Force recovered at elbow: nothing is missing, this is noise and what tuning moved"
+    # Bars of zeros would look like a place.
+    axes = drawn["where"].axes
+    assert [one.get_title(loc="left") for one in axes] == [
+        "In which band the error lies", "While which variable is where"
+    ]  # fmt: skip
+    assert axes[-1].get_xlabel() == "Share of the error [%]"
+    assert [one.get_xlabel() for one in gap_sheet(evidence).axes] == ["Time [s]", "Frequency [Hz]"]
+    lacking = gap_album(gap_evidence(made.unknown())).figures["restoring force"].get_suptitle()
+    assert lacking == "Force that the model lacks at elbow"
+
+
 def test_nothing_at_all_is_drawn_as_nothing() -> None:
     where = replace(made.diagnosis().where, sites=(), bands=(), regimes=())
     bare = replace(made.diagnosis(), signals=None, restoring_forces=(), where=where)

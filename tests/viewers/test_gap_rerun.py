@@ -116,10 +116,10 @@ def wild(tmp_path_factory: pytest.TempPathFactory) -> Contents:
 
 
 def test_wild_ends_of_a_record_do_not_flatten_the_force_over_time(wild: Contents) -> None:
-    (name,) = (name for name in wild.view_names() if name.startswith("Force lacking at elbow [N]"))
+    (name,) = (name for name in wild.view_names() if name.startswith("Force recovered at elbow [N]"))
     (low, high), *_ = (row["ScalarAxis:range"][0] for row in wild.blueprint if row.get("ScalarAxis:range"))
     assert (low, high) == pytest.approx(force_range(made.restoring_force()), rel=0.1)
-    assert name.startswith(f"Force lacking at elbow [N], ±{engineering(high, None, 'N')} ")
+    assert name.startswith(f"Force recovered at elbow [N], ±{engineering(high, None, 'N')} ")
     most = np.abs(wild.scalars("/restoring_force/time/0")).max()
     assert name.endswith(f" · reaches {engineering(most, None, 'N')}, beyond the axis")
 
@@ -128,7 +128,7 @@ def test_wild_ends_of_a_record_do_not_flatten_the_force_over_time(wild: Contents
 def test_dots_beyond_the_axis_are_counted_not_drawn_among_the_numbers(wild: Contents, over: str) -> None:
     dots = np.array(wild.static(f"/restoring_force/{over}/force")["Points2D:positions"])
     assert ((dots[:, 1] >= 0) & (dots[:, 1] <= restoring_force.HEIGHT)).all()
-    (name,) = (name for name in wild.view_names() if name.startswith(f"Force lacking at elbow over {over}"))
+    (name,) = (name for name in wild.view_names() if name.startswith(f"Force recovered at elbow over {over}"))
     assert name.endswith(f" · {3000 - len(dots)} of 3000 dots lie beyond the axis")
     assert len(dots) < len(wild.static(f"/restoring_force/{over}/law")["Points2D:positions"]) == 3000
 
@@ -172,7 +172,7 @@ def test_the_arrangement_has_a_page_of_each_kind(arm: Contents) -> None:
     names = arm.view_names()
     for name in ("Answer", "acc_wrist [m/s²]", "acc_column [m/s²]"):
         assert name in names
-    assert any(name.startswith("Force lacking at elbow [N], ±") for name in names)
+    assert any(name.startswith("Force recovered at elbow [N], ±") for name in names)
     assert any(name.startswith("Gap before [dB re 1/Hz]") for name in names)
     assert any(name.startswith("What each part alone can explain") for name in names)
 
@@ -185,7 +185,7 @@ def test_long_logs_are_thinned_and_say_so(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_what_is_not_there_has_no_page(tmp_path: Path) -> None:
-    bare = replace(made.agreeing(), signals=None)
+    bare = replace(made.agreeing(), signals=None, restoring_forces=())
     contents = Contents(write_gap_rrd(gap_evidence(bare), tmp_path / "bare.rrd"))
     assert contents.entities() >= {"/answer"}
     assert not any(entity.startswith(("/signals", "/structure", "/gap_map")) for entity in contents.entities())
@@ -209,4 +209,4 @@ def test_of_two_forces_each_has_a_page(tmp_path: Path) -> None:
     contents = Contents(written(found, tmp_path))
     for site in ("elbow", "shoulder"):
         assert f"/restoring_force_at_{site}/velocity/force" in contents.entities()
-        assert any(name.startswith(f"Force lacking at {site} over velocity") for name in contents.view_names())
+        assert any(name.startswith(f"Force recovered at {site} over velocity") for name in contents.view_names())

@@ -1,10 +1,11 @@
 """A diagnosis in sentences and tables."""
 
+import re
 from dataclasses import replace
 
 import pytest
 
-from chladni.gap.records.diagnosis import AnyLaw, Candidate, Cause, FittedNumber, PairShare, Ranked
+from chladni.gap.records.diagnosis import AnyLaw, Candidate, Cause, FittedNumber, PairShare
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.viewers import gap_tables as tables
 from chladni.viewers.effect_words import cause_law, cause_phrase, effect_at, effect_heading, effect_name
@@ -124,17 +125,34 @@ def test_sites_and_effects_that_cant_be_told_apart_are_named() -> None:
 
 def test_a_word_that_is_told_for_its_family_says_whose_the_probability_is() -> None:
     found = made.indistinguishable()
-    cause = replace(found.causes[0], probability=0.62)
-    row = Ranked(effect=cause.effect, site=cause.site, probability=0.4, gap=None, log_evidence=None)
-    said = " ".join(summary(replace(found, causes=(cause,), ranking=(row,))))
+    cause = replace(found.causes[0], probability=0.62, probability_of=("coulomb_friction", "hysteresis"))
+    said = " ".join(summary(replace(found, causes=(cause,))))
     assert "from hysteresis at elbow: 62 % is that of its family there." in said
 
 
 def test_nothing_missing_is_told_with_what_was_tuned() -> None:
     said = summary(made.agreeing())
     assert said[0].startswith("Nothing is missing: the model's error is 1.0 %")
-    assert "elbow.stiffness is 20.400 ± 0.080 kN/m where the model has 20 kN/m" in said[1]
+    assert said[1] == "No force, error or change at any of 4 places explains anything beyond the noise."
+    assert "elbow.stiffness is 20.400 ± 0.080 kN/m where the model has 20 kN/m" in said[2]
     assert not any("closed" in one.lower() for one in said)
+
+
+@pytest.mark.parametrize("kind", ["effect", "unknown", "none", "parameters", "periodic"])
+def test_noise_that_is_a_bound_is_told_as_one_wherever_it_is_told(kind: str) -> None:
+    found = made.every_kind()[kind]
+    bound = replace(
+        found,
+        gap=replace(found.gap, noise_at_most=True, before=2.0 * found.gap.noise),
+        elsewhere=tuple(replace(one, noise_at_most=True) for one in found.elsewhere),
+    )
+    told = [one for one in summary(bound) if re.search(r"noise (at most )?\d", one)]
+    assert told
+    assert all(re.search(r"noise at most \d", one) for one in told)
+    assert not any("times the noise" in one for one in summary(bound))
+    first, *_ = found.where.channels
+    where = replace(found.where, channels=(replace(first, noise_at_most=True, noise=0.068),))
+    assert tables.channel_table(where)[1][0][2] == "at most 6.8 %"
 
 
 def test_wrong_values_are_told_against_the_nominal_ones() -> None:

@@ -68,8 +68,10 @@ def channel_gaps(
     # The same scale for both, so that gap and noise can be held against each other.
     floors = relative_residual(np.broadcast_to(noise.rms[:, None], measured.shape), measured)[:, 0]
     return tuple(
-        ChannelGap(name=name, gap=float(gap), noise=float(floor), noise_from=method)
-        for name, gap, floor, method in zip(output_names, gaps, floors, noise.method, strict=True)
+        ChannelGap(name=name, gap=float(gap), noise=float(floor), noise_from=method, noise_at_most=bool(at_most))
+        for name, gap, floor, method, at_most in zip(
+            output_names, gaps, floors, noise.method, noise.upper_bound, strict=True
+        )
     )
 
 

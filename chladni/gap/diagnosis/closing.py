@@ -100,6 +100,7 @@ def closing_of(yardstick: Yardstick, before: Real, tuned: Real, after: Real, *, 
         held_out=tuple(_stretches(yardstick)),
         by=yardstick.by,
         horizon_s=yardstick.horizon_s,
+        noise_at_most=bool(yardstick.noise.upper_bound.any()),
     )
 
 

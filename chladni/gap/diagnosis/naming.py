@@ -108,6 +108,7 @@ def _cause(study: Study, causes: Causes, place: int) -> Cause:
     best = causes.best
     candidate = best.hypothesis.named[place]
     alike = causes.belief.alike(candidate)
+    words = tuple(dict.fromkeys(one.effect for one in alike))
     effect = best.fit.effects[place] if place < len(best.fit.effects) else None
     return Cause(
         effect=candidate.effect,
@@ -119,6 +120,7 @@ def _cause(study: Study, causes: Causes, place: int) -> Cause:
         parameters=_numbers(study, best, place),
         variant=effect.variant if effect is not None else None,
         source=effect.source if effect is not None else None,
+        probability_of=words if len(words) > 1 else (),
     )
 
 

@@ -73,6 +73,8 @@ class Cause:
         Sites that these sensors can't tell from `site`, itself included.
     alternatives
         Other candidates that this log can't tell from this one.
+    probability_of
+        Words of its family, `effect` first, whose `probability` together it is; empty where it's that of `effect`.
     parameters
         By name.
     variant, source
@@ -91,6 +93,7 @@ class Cause:
     variant: str | None = None
     source: str | None = None
     share: float | None = None
+    probability_of: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,13 +115,15 @@ class Ranked:
 class ChannelGap:
     """Gap of the nominal model and noise of one output, both over the RMS of what was measured.
 
-    `noise_from` says where the noise was estimated from, see `NoiseFloor.method`.
+    `noise_from` says where the noise was estimated from, see `NoiseFloor.method`; `noise_at_most` that distortion may
+    be in it, so that the true noise is less.
     """
 
     name: str
     gap: float
     noise: float
     noise_from: str = ""
+    noise_at_most: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -230,6 +235,8 @@ class Closing:
     explained
         (tuned^2 - after^2)/(tuned^2 - noise^2), clipped to 0..1: share of the power that the best parameters leave;
         None when nothing was added to them or tuned - noise is within its own uncertainty.
+    noise_at_most
+        Whether distortion may be in `noise`, so that the true one is less.
     """
 
     before: float
@@ -242,6 +249,7 @@ class Closing:
     by: Literal["free_run", "windows", "cross_sensor", "torque"] = "free_run"
     horizon_s: float | None = None
     explained: float | None = None
+    noise_at_most: bool = False
 
     @property
     def after_over_noise(self) -> float | None:

@@ -38,6 +38,8 @@ def share_figures(evidence: GapEvidence) -> dict[str, Figure]:
 
 def share_label(found: Diagnosis) -> str:
     """What the bars are shares of."""
+    if found.verdict == "none":
+        return "Share of the error [%]"
     return "Share of the gap [%]" if found.left is None else "Share of what the best parameters leave [%]"
 
 
@@ -56,6 +58,8 @@ def draw_shares(axes: Axes, bars: Sequence[Bar], *, named: set[str]) -> None:
         axes.text(100 * share, place, f" {percent(share)}", va="center", fontsize=6.5)
     axes.set_yticks(places, [plain(name) for name, _ in bars], fontsize=7)
     axes.set_ylim(len(bars) - 0.4, -0.6)
+    if not bars:
+        axes.text(0.5, 0.5, "no place explains anything", transform=axes.transAxes, ha="center", va="center")
     # Room for the number behind a full bar.
     axes.set_xlim(0, 112)
     axes.grid(visible=False, axis="y")
@@ -68,7 +72,7 @@ def _parts(found: Diagnosis) -> list[tuple[str, Sequence[Bar]]]:
     regimes = sorted(where.regimes, key=lambda one: -one.share)
     return [
         (site_title(found), site_bars(found, count=None)),
-        ("In which band it lies", bands),
+        ("In which band it lies" if found.verdict != "none" else "In which band the error lies", bands),
         (
             "While which variable is where",
             [(f"{one.variable} {span(one.low, one.high, one.unit)}", one.share) for one in regimes],

@@ -88,7 +88,9 @@ def _parts(evidence: GapEvidence) -> list[Part]:
         parts += [(1.4, lambda figure, place: _errors(figure, place, evidence))]
     if evidence.spectra is not None:
         parts += [(1.4, lambda figure, place: _spectrum(figure, place, evidence))]
-    parts += [(2.6, partial(_force, surface=one)) for one in found.restoring_forces if one.force.size]
+    # Where nothing is missing the force is no evidence; the figure of it says what it is.
+    forces = [] if found.verdict == "none" else found.restoring_forces
+    parts += [(2.6, partial(_force, surface=one)) for one in forces if one.force.size]
     if bars:
         parts += [(0.4 + BAR_HEIGHT_IN * len(bars), lambda figure, place: _sites(figure, place, found))]
     return parts

@@ -91,7 +91,7 @@ def power_of_ten(value: float) -> str:
     ('10⁻³', '1', '100')
     """
     exponent = round(log10(value))
-    if -1 <= exponent <= 3:
+    if -2 <= exponent <= 3:
         return f"{10.0**exponent:g}"
     return "10" + str(exponent).translate(_SUPERSCRIPTS)
 

@@ -11,6 +11,7 @@ from chladni.gap.records.diagnosis import RestoringForce
 from chladni.viewers.engineering import axis_scale
 from chladni.viewers.figures.sheet import WIDTH_IN, look, paint, plain
 from chladni.viewers.gap_evidence import MEASURED_ON_LIGHT, GapEvidence
+from chladni.viewers.gap_tables import force_title
 from chladni.viewers.restoring_force import (
     SIGNED,
     Over,
@@ -44,7 +45,7 @@ def _figure(evidence: GapEvidence, surface: RestoringForce) -> Figure:
         over_velocity = figure.add_subplot(grid[0, 1], sharey=over_displacement)
         draw_surfaces(figure, over_displacement, over_velocity, surface)
         _draw_over_time(figure.add_subplot(grid[1, :]), surface, evidence.telling_s)
-        figure.suptitle(plain(f"Force that the model lacks at {surface.site}"), fontsize=8.5, x=0.02, ha="left")
+        figure.suptitle(plain(force_title(evidence.found, surface.site)), fontsize=8.5, x=0.02, ha="left")
         return figure
 
 

@@ -86,13 +86,13 @@ def _body(title: str, found: Diagnosis, shown: _Shown) -> Iterator[str]:
     yield _section("Torque that is missing", shown.of("residuals"))
     yield _section("Answer", _answer(found))
     yield _section("Errors, before and after", shown.of("errors"))
-    yield _section("Force that is missing", shown.of("force"))
+    yield _section("Force that is missing" if found.verdict != "none" else "Force recovered", shown.of("force"))
     yield _section("Causes", _causes(found))
     yield _section("Friction", shown.of("friction", "positions"))
     yield _section("Spectra of the errors", shown.of("spectra"))
     yield _section("Motion", shown.of("motion"))
     # With one sensor no site can be told from another, and bands and regimes are read as easily in tables.
-    drawn = bool(found.where.sites and shown.album.sections.get("shares"))
+    drawn = bool(tables.places_of(found.where) and shown.album.sections.get("shares"))
     places = ("shares", "map") if drawn else ("map",)
     yield _section(
         "Where it lies",
@@ -212,7 +212,10 @@ def _captions(found: Diagnosis) -> Mapping[str, str]:
         "errors": f"What is left of the whole log, before and {after}.",
         "spectra": "Spectra of the errors and of what was measured." + (" Mean over the windows." if windows else ""),
         "map": f"Density of the gap over band and time, before and {after}; outputs over their RMS.",
-        "force": "Force that the model lacks, recovered without assuming a law"
+        "force": (
+            "Force that the model lacks" if found.verdict != "none" else "Noise and what tuning moved as a force"
+        )
+        + ", recovered without assuming a law"
         + ("; dots, and the thin line: the law that was named." if drawn else "."),
         "shares": ("In colour: the site that was named." if coloured else "")
         or ("Of what the best parameters leave." if found.left is not None else "Shares of the gap."),

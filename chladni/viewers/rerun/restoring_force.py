@@ -59,7 +59,7 @@ def _draw(recording: rr.RecordingStream, surface: RestoringForce, path: str, ove
         law = canvas.places(x, surface.law_force[rows] / up)
         _dots(recording, f"{path}/law", law, np.array([LAW_COLOUR], dtype=np.uint8), points=0.8)
     law_told = "" if surface.law_force is None else "; white: law"
-    name = f"Force lacking at {surface.site} over {over}; blue to orange: {other(over)}{law_told}"
+    name = f"Force recovered at {surface.site} over {over}; blue to orange: {other(over)}{law_told}"
     return canvas.view(path, f"{name}{_beyond(rows.size - inside.size, rows.size)}", above=ABOVE)
 
 
@@ -91,7 +91,7 @@ def draw_force_over_time(recording: rr.RecordingStream, surface: RestoringForce,
     return rrb.TimeSeriesView(
         origin=f"{path}/time",
         # The viewer labels powers of ten alone where there is little room.
-        name=f"Force lacking at {visible(surface.site)} [{printed_unit(unit)}], "
+        name=f"Force recovered at {visible(surface.site)} [{printed_unit(unit)}], "
         f"±{engineering(reach, None, unit)}{beyond}",
         axis_x=time_axis(end_ns, start_ns=start_ns),
         axis_y=rrb.ScalarAxis(range=force_range(surface)),

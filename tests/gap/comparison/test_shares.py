@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +25,11 @@ def test_the_gap_of_a_channel_is_over_what_was_measured() -> None:
     first, second = channel_gaps(residual, measured, noise, output_names=("a", "b"))
     assert (first.name, second.name) == ("a", "b")
     assert (first.gap, second.gap) == (pytest.approx(0.1), pytest.approx(0.5))
+    assert first.noise_at_most
+    assert second.noise_at_most
+    sure = replace(noise, upper_bound=np.array([True, False]))
+    told = channel_gaps(residual, measured, sure, output_names=("a", "b"))
+    assert [one.noise_at_most for one in told] == [True, False]
     assert (first.noise, second.noise) == (pytest.approx(0.01, rel=1e-3), pytest.approx(0.01, rel=1e-3))
     assert pooled_gap(residual, measured) == pytest.approx(np.sqrt((0.01 + 0.25) / 2))
 

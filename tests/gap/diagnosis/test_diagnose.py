@@ -53,6 +53,7 @@ def test_the_gap_closes_to_the_noise(friction: Diagnosis) -> None:
     # One per cent of noise was added; its estimate before may hold what friction did beyond a linear response.
     assert friction.gap.after == pytest.approx(0.01, rel=0.1)
     assert friction.gap.after < friction.gap.noise < 0.015
+    assert friction.gap.noise_at_most
     assert friction.gap.closed is not None
     assert friction.gap.closed > 0.98
     low, high = friction.gap.interval or (0.0, 0.0)

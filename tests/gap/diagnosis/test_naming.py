@@ -76,6 +76,15 @@ def test_a_word_at_sites_that_look_the_same_is_as_probable_as_all_of_them_togeth
     assert rows["ripple", "shaker"] == pytest.approx(0.35 * SURE, abs=1e-3)
 
 
+def test_a_probability_that_words_of_a_family_share_is_told_as_theirs() -> None:
+    late = attached("delay", "shaker", {"delay": 1e-3})
+    (shared,) = causes_named(NO_STEPS, weighed_causes((contestant(LAG), 0.4), (contestant(late), 0.35)))
+    assert shared.probability_of == ("lag", "delay")
+    assert shared.probability == pytest.approx(0.75 * SURE, abs=1e-3)
+    (alone,) = causes_named(NO_STEPS, weighed_causes((contestant(LAG), 0.6), (contestant(late), 0.35)))
+    assert alone.probability_of == ()
+
+
 def test_a_word_that_is_best_as_half_of_a_pair_says_beside_what() -> None:
     # By falling evidence: the mount's best fit is the pair's, the lag's is its own.
     found = weighed_causes((contestant(LAG), 0.9), (contestant(MOUNT, LAG), 0.06), (contestant(MOUNT, chi=9.0), 0.03))
