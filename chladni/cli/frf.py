@@ -40,12 +40,14 @@ def frf(
     from chladni.apps.documents import frf_document
     from chladni.apps.findings import reading_sentences
     from chladni.apps.frf import transfer
+    from chladni.signals.shown_units import require_units
     from chladni.signals.study import Study
     from chladni.spectral.peaks import find_response_peaks
 
     out = targets.output([*logs, opener.setup], looks)
     studies: list[Study] = []
     for title, opened, progress in told_apart(logs, opener, out):
+        require_units(opened.channels, cut.unit)
         whole = transfer(
             opened,
             reference,

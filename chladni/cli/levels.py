@@ -46,11 +46,12 @@ def levels(
     """RMS, peak, crest factor, skewness, kurtosis, and vibration severity in mm/s."""
     from chladni.apps.findings import reading_sentences
     from chladni.apps.levels import levels_document, measure_levels
-    from chladni.signals.shown_units import all_in_units
+    from chladni.signals.shown_units import all_in_units, require_units
     from chladni.signals.study import Study
 
     out = targets.output([log, opener.setup])
     with opener(log) as opened, out.progress(log.name) as progress:
+        require_units(opened.channels, unit)
         measured = measure_levels(
             opened,
             channels=channel,

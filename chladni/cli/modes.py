@@ -74,6 +74,7 @@ def modes(
     """Natural frequencies, damping ratios and modal vectors, with their uncertainty."""
     from chladni.apps.modal_study import modal_study
     from chladni.apps.modes import Wanted
+    from chladni.signals.shown_units import require_units
 
     out = targets.output([log, opener.setup], looks, others={"--uff": uff, "--save": save})
     asked = _below(band, fmax)
@@ -83,6 +84,7 @@ def modes(
         "resolution_hz": resolution, "span": part.span(join=join),
     }  # fmt: skip
     with opener(log) as opened:
+        require_units(opened.channels, unit)
         if pick:
             picking = _picking(out, opened, wanted=wanted, **given)
             wanted = _kept(out, picking, wanted, port=port, open_page=open_page)

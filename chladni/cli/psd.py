@@ -33,11 +33,13 @@ def psd(
     from chladni.apps.findings import reading_sentences
     from chladni.apps.psd import densities
     from chladni.apps.unit_peaks import unit_peaks
+    from chladni.signals.shown_units import require_units
     from chladni.signals.study import Study
 
     out = targets.output([*logs, opener.setup], looks)
     studies: list[Study] = []
     for title, opened, progress in told_apart(logs, opener, out):
+        require_units(opened.channels, cut.unit)
         spectra = densities(
             opened, channels=channel, averaging=averages.averaging(), span=part.span(), progress=progress
         )

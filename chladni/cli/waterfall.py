@@ -27,11 +27,13 @@ def waterfall(
     """Spectra over time: how strong each frequency is in each slice of the log."""
     from chladni.apps.findings import reading_sentences
     from chladni.apps.waterfalls import measure_waterfalls, waterfalls_document
+    from chladni.signals.shown_units import require_units
     from chladni.signals.study import Study
 
     looks = options.Looks(log_frequency=log_frequency)
     out = targets.output([log, opener.setup], looks)
     with opener(log) as opened, out.progress(log.name) as progress:
+        require_units(opened.channels, cut.unit)
         whole = measure_waterfalls(
             opened, channels=channel, averaging=averages.averaging(), span=part.span(), progress=progress
         )

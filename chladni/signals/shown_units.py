@@ -1,6 +1,6 @@
 """Values in the unit that people ask for: the same quantity, counted otherwise."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
@@ -83,12 +83,17 @@ def all_in_units(values: Sequence[ValueT], units: Names | None) -> tuple[ValueT,
     """Give several values of one log in other units, see `in_units`; each unit fits a channel of one."""
     if not units:
         return tuple(values)
+    require_units([channel for value in values for channel in _channels(value)], units)
     asked = units_by_quantity(as_names(units))
-    held = [channel.unit for value in values for channel in _channels(value)]
-    for si_unit, unit in asked.items():
+    return tuple(_shown(value, asked) for value in values)
+
+
+def require_units(channels: Iterable[Channel], units: Names | None) -> None:
+    """Raise `SetupError` when none of the channels is of the quantity of a unit."""
+    held = [channel.unit for channel in channels]
+    for si_unit, unit in units_by_quantity(as_names(units or ())).items():
         if si_unit not in held:
             raise SetupError(_misfit(unit, si_unit, list(dict.fromkeys(held))))
-    return tuple(_shown(value, asked) for value in values)
 
 
 def synthesis_in_units(modes: ModeSet, units: Names | None) -> ModeSet:

@@ -78,6 +78,28 @@ def test_what_can_be_no_unit_is_told_before_a_log_is_opened(
     assert says in outcome.err
 
 
+@pytest.mark.parametrize(
+    ("command", "reading"),
+    [
+        ("psd", "psd.densities"),
+        ("waterfall", "waterfalls.measure_waterfalls"),
+        ("levels", "levels.measure_levels"),
+        ("frf", "frf.transfer"),
+        ("modes", "modal_study.modal_study"),
+    ],
+)
+def test_a_quantity_that_no_channel_has_is_refused_before_samples_are_read(
+    run: Run, log: Path, monkeypatch: pytest.MonkeyPatch, command: str, reading: str
+) -> None:
+    def read(*_: object, **__: object) -> None:
+        raise AssertionError("samples were read")
+
+    monkeypatch.setattr(f"chladni.apps.{reading}", read)
+    outcome = run(command, log, "--unit", "kg")
+    assert outcome.code == 2
+    assert "--unit kg: no channel is in kg; what fits: " in outcome.err
+
+
 def test_a_band_without_lines_is_refused(run: Run, log: Path) -> None:
     outcome = run("psd", log, "--band", "900-1000")
     assert outcome.code == 2
