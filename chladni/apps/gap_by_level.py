@@ -11,8 +11,8 @@ from chladni.gap.calibration import ALIKE
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.records.measurement import Measurement
+from chladni.signals.engineering import percent
 from chladni.signals.errors import EstimateError
-from chladni.viewers.engineering import percent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

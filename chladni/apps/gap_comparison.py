@@ -16,12 +16,12 @@ from chladni.gap.records.diagnosis import DistortionShare, Where
 from chladni.gap.records.measurement import Measurement
 from chladni.io.log import Log
 from chladni.io.log_info import some_of
+from chladni.signals.engineering import bounded_percent, percent
 from chladni.signals.errors import LogError
 from chladni.signals.join import JoinMethod
 from chladni.signals.number_range import rms
 from chladni.signals.time_series import NS_PER_S, TimeSeries
 from chladni.signals.wording import counted
-from chladni.viewers.engineering import bounded_percent, percent
 
 COMPARISON_FORMAT: Final = "chladni.gap-comparison/1"
 # What differs by less than this share of its RMS was played back, not simulated: digits of a CSV, single precision.

@@ -204,7 +204,7 @@ def _write(
     to: Output, out: Path, followed: "Trends", verdict: "Verdict", *, report: Path | None, save: Path | None
 ) -> None:
     from chladni.apps.study.trends import LEAST_TO_CHANGE, trend_sentences
-    from chladni.viewers.labels import printed_unit
+    from chladni.signals.unit_text import printed_unit
 
     # A page and a recording write units as their pictures do.
     changes = trend_sentences(followed.trends, unit=printed_unit)

@@ -170,7 +170,8 @@ def _held_by_none(machine: Machine, *, delay_held: bool) -> Iterator[str]:
 
 
 def _not_held(one: MachineJoint) -> Iterator[str]:
-    name, force, angle = one.joint.name, *(("N m", "rad") if one.joint.kind == "hinge" else ("N", "m"))
+    hinge = one.joint.kind == "hinge"
+    name, force, angle, rotor = one.joint.name, *(("N m", "rad", "kg m^2") if hinge else ("N", "m", "kg"))
     if one.load:
         yield f"{name}: friction of {one.load:.4g} of the load; {one.friction:.4g} {force} are held"
     if one.rise:
@@ -196,7 +197,7 @@ def _not_held(one: MachineJoint) -> Iterator[str]:
             if between.gap
             else f"a spring of {between.stiffness:.4g} {force}/{angle}"
         )
-        yield f"{name}: {way} between motor and link, and a rotor of {between.inertia:.3g} before it"
+        yield f"{name}: {way} between motor and link, and a rotor of {between.inertia:.3g} {rotor} before it"
     if one.dead:
         yield f"{name}: its drive gives nothing below {one.dead:.4g} {force}"
     if np.isfinite(one.rate):

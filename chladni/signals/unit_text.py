@@ -114,6 +114,17 @@ def with_unit(number: str, unit: str) -> str:
     return number if unit == "1" else f"{number} {unit}"
 
 
+def printed_unit(unit: str) -> str:
+    """Give a unit as it's printed.
+
+    Examples
+    --------
+    >>> printed_unit("(m/s^2)^2/Hz")
+    '(m/s²)²/Hz'
+    """
+    return unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("*", "·")
+
+
 def in_unit(unit: str) -> str:
     """Say in a sentence which unit something is in.
 

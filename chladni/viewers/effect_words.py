@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from chladni.gap.records.diagnosis import PARAMETER, Cause, FittedNumber
 from chladni.gap.records.robot import site_words
 from chladni.models.effects.catalogue import CATALOGUE, spoken_effect
-from chladni.viewers.engineering import engineering
+from chladni.signals.engineering import engineering
 
 # A sigma so many times the value tells nothing of it. What can't be negative is fitted by its logarithm: a sigma of
 # its own size is a factor of e. What has a sign may well be known to be near zero, beside other numbers of its law.

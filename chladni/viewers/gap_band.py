@@ -4,7 +4,7 @@ import numpy as np
 
 from chladni.gap.records.diagnosis import GapSignals
 from chladni.signals.arrays import Real
-from chladni.viewers.engineering import percent
+from chladni.signals.engineering import percent
 
 # Of the gap so much may lie above the band that is shown; some room above it shows that nothing comes.
 LEFT_OUT, ROOM = 0.01, 1.2

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Closing, Diagnosis, FittedNumber
 from chladni.gap.records.measurement import LogUse
 from chladni.gap.records.robot import site_words
+from chladni.signals.engineering import bounded_percent, chance, engineering, percent
 from chladni.signals.wording import counted
 from chladni.viewers.effect_words import cause_phrase, effect_at, effect_heading
-from chladni.viewers.engineering import bounded_percent, chance, engineering, percent
 from chladni.viewers.gap_tables import places_of
 from chladni.viewers.robot_summary import IN_A_SENTENCE, listed, robot_sentences, robot_unknown
 

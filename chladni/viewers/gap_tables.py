@@ -6,8 +6,7 @@ from math import inf
 
 from chladni.gap.records.diagnosis import Cause, Diagnosis, DistortionShare, FittedNumber, Ranked, Where
 from chladni.models.effects.catalogue import CATALOGUE
-from chladni.viewers.effect_words import NOT_DETERMINED, cause_heading, effect_heading, printed_number
-from chladni.viewers.engineering import (
+from chladni.signals.engineering import (
     NOTHING,
     SURE,
     bounded_percent,
@@ -17,6 +16,7 @@ from chladni.viewers.engineering import (
     signed_percent,
     span,
 )
+from chladni.viewers.effect_words import NOT_DETERMINED, cause_heading, effect_heading, printed_number
 
 Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chladni.signals.channel import Channel
-from chladni.viewers.labels import printed_unit, quantity
+from chladni.signals.unit_text import printed_unit
+from chladni.viewers.labels import quantity
 
 LINES_IN_A_PLOT = 6
 

@@ -1,6 +1,7 @@
 """Words on plots: units as printed, names of quantities."""
 
 from chladni.signals.errors import SetupError
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.units import si_factor
 
 _QUANTITIES = {
@@ -19,17 +20,6 @@ _QUANTITIES = {
     "K": "Temperature",
     "s": "Time",
 }
-
-
-def printed_unit(unit: str) -> str:
-    """Give a unit as it's printed.
-
-    Examples
-    --------
-    >>> printed_unit("(m/s^2)^2/Hz")
-    '(m/s²)²/Hz'
-    """
-    return unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("*", "·")
 
 
 def quantity(unit: str) -> str:

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from chladni.signals.arrays import Real
 from chladni.signals.frequency_response import FrequencyResponse
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit, response_quantity
+from chladni.viewers.labels import response_quantity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

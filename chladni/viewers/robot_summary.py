@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Diagnosis, FittedNumber, Ranked
 from chladni.gap.records.robot import site_words
+from chladni.signals.engineering import chance, engineering, percent, span
 from chladni.viewers.effect_words import effect_at, effect_heading
-from chladni.viewers.engineering import chance, engineering, percent, span
 
 #: Clauses that one sentence holds, and joints that one clause joins.
 IN_A_SENTENCE, JOINED = 4, 3

@@ -13,9 +13,9 @@ from chladni.apps.gap_comparison import GapComparison, answer, compare_with_simu
 from chladni.io.log import open_log
 from chladni.io.mcap.writer import write_mcap
 from chladni.signals.channel import Channel
+from chladni.signals.engineering import percent
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
-from chladni.viewers.engineering import percent
 from chladni.viewers.gap_tables import split_table
 from tests import made_diagnosis as made
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from chladni.apps.gap_evidence import gap_evidence
 from chladni.gap.records.diagnosis import FittedNumber
+from chladni.signals.engineering import axis_scale
 from chladni.signals.errors import EstimateError
-from chladni.viewers.engineering import axis_scale
 from chladni.viewers.figures.campaign import ReliabilityBin, calibration_figure, confusion_figure
 from chladni.viewers.figures.gap import gap_album
 from chladni.viewers.figures.gap_sheet import LETTERS, LIMIT_LETTERS, SENTENCES, gap_sheet

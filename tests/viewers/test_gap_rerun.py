@@ -12,7 +12,7 @@ import rerun as rr
 from chladni.apps.gap_evidence import gap_evidence
 from chladni.apps.gap_structure import structure_sketch
 from chladni.gap.records.diagnosis import Diagnosis
-from chladni.viewers.engineering import engineering
+from chladni.signals.engineering import engineering
 from chladni.viewers.gap_band import band_told, shown_hz
 from chladni.viewers.rerun import gap_signals, restoring_force
 from chladni.viewers.rerun.gap import write_gap_rrd

@@ -7,9 +7,9 @@ import pytest
 
 from chladni.gap.records.diagnosis import AnyLaw, Candidate, Cause, FittedNumber, PairShare
 from chladni.models.effects.catalogue import CATALOGUE
+from chladni.signals.engineering import engineering, percent
 from chladni.viewers import gap_tables as tables
 from chladni.viewers.effect_words import cause_law, cause_phrase, effect_at, effect_heading, effect_name
-from chladni.viewers.engineering import engineering, percent
 from chladni.viewers.gap_summary import caveats, headline, naive_sentence, summary
 from tests import made_diagnosis as made
 

@@ -15,7 +15,7 @@ from chladni.models.excitations.random_noise import RandomNoise
 from chladni.models.excitations.swept_sine import SweptSine
 from chladni.models.structures.structure_model import StructureModel
 from chladni.signals.arrays import Real
-from chladni.signals.unit_text import with_unit
+from chladni.signals.engineering import engineering
 
 Band = tuple[float, float]
 
@@ -172,7 +172,7 @@ class Reach:
     def _told(self, sizes: Real, word: str = "RMS") -> str:
         units = [one.unit for one in self.model.compile().inputs]
         told = [
-            with_unit(f"{size:.3g}", unit) for size, unit, rms in zip(sizes, units, self.rms, strict=True) if rms > 0
+            engineering(size, None, unit) for size, unit, rms in zip(sizes, units, self.rms, strict=True) if rms > 0
         ]
         return f" ({word} {' and '.join(told)})" if told else ""
 

@@ -15,6 +15,7 @@ from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.black_box import BlackBox
 from chladni.gap.records.measurement import Measurement
 from chladni.io.log_info import some_of
+from chladni.signals.engineering import engineering
 
 
 def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Distortion | None) -> tuple[str, ...]:
@@ -53,8 +54,8 @@ def _constants(study: Study, causes: Causes, shown: Contestant) -> list[str]:
     """Constants that get no name: beside another cause they may have any reason."""
     units = dict(zip(study.measurement.output_names, study.measurement.output_units, strict=True))
     return [
-        f"{name} is {value:+.3g} {units[name]} beside the model all the time: an offset of the sensor, gravity or a "
-        "tilt; it counts for nothing in this answer"
+        f"{name} is {'+' if value > 0 else ''}{engineering(value, None, units[name])} beside the model all the time: "
+        "an offset of the sensor, gravity or a tilt; it counts for nothing in this answer"
         for name, value in study.constants(shown.fit, causes.noise).items()
         if name not in causes.constants
     ]

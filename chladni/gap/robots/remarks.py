@@ -8,6 +8,7 @@ from chladni.gap.robots.pushes import Push
 from chladni.gap.robots.solved import Solved
 from chladni.gap.robots.tuned import Pulled, pulled_masses
 from chladni.io.log_info import some_of
+from chladni.signals.engineering import engineering
 
 #: Share of a log in which a joint has to move.
 _MOVES = 0.05
@@ -33,7 +34,7 @@ def remarks_on(solved: Solved, unexplained: Sequence[str], *, named: bool) -> tu
 def _pushed(one: Push) -> str:
     return (
         f"something pushes at {some_of(one.joints)} from {one.start_s:.2f} s to {one.end_s:.2f} s, by up to "
-        f"{one.torque:.3g} {one.unit}; those seconds told nothing of the causes"
+        f"{engineering(one.torque, None, one.unit)}; those seconds told nothing of the causes"
     )
 
 

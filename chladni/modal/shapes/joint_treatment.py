@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chladni.modal.shapes.mode_words import capital, mode_name, prefixed
+from chladni.modal.shapes.mode_words import capital, mode_name
 from chladni.modal.shapes.relative_motion import kilogram_scale
+from chladni.signals.engineering import engineering
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.relative_motion import RelativeMotion
 
@@ -147,7 +148,7 @@ def _sentence(
         )
     frequency_hz, damping = float(modes.frequency_hz[motion.mode]), float(modes.damping_ratio[motion.mode])
     return (
-        f"{start}; a damper of {prefixed(damper, 'N s/m')} between the two would double the damping of "
-        f"{100 * damping:.2g} % and a spring of {prefixed(spring, 'N/m')} raise the frequency by "
+        f"{start}; a damper of {engineering(damper, None, 'N s/m')} between the two would double the damping of "
+        f"{100 * damping:.2g} % and a spring of {engineering(spring, None, 'N/m')} raise the frequency by "
         f"{_FREQUENCY_STEP * frequency_hz:.2g} Hz, to first order."
     )

@@ -51,19 +51,3 @@ def joined(words: Sequence[str], *, most: int = 6) -> str:
     if len(words) > most:
         words = [*words[:most], f"{len(words) - most} more"]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
-
-
-def prefixed(number: float, unit: str) -> str:
-    """Give a number of three digits with the prefix that keeps it short.
-
-    Examples
-    --------
-    >>> prefixed(8342.0, "N s/m"), prefixed(275.3, "N s/m"), prefixed(5e6, "N/m"), prefixed(0.0021, "N/m")
-    ('8.34 kN s/m', '275 N s/m', '5 MN/m', '0.0021 N/m')
-    """
-    # Rounded first: 999.6 is 1 k, not 1e+03.
-    rounded = float(f"{number:.3g}")
-    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        if abs(rounded) >= factor:
-            return f"{rounded / factor:.3g} {prefix}{unit}"
-    return f"{rounded:.3g} {unit}"

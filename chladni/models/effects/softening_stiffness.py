@@ -25,6 +25,7 @@ from chladni.models.effects.trial import (
     rms,
 )
 from chladni.signals.arrays import Real
+from chladni.signals.engineering import engineering
 from chladni.signals.errors import ModelError
 
 # Finite, because laws take finite numbers only.
@@ -82,9 +83,10 @@ def _flags(port: Port, values: Values, simulation: Simulation) -> tuple[str, ...
     reached = float(np.max(np.abs(simulation.motion(port.name).displacement), initial=0.0))
     if reached <= end:
         return ()
+    told, valid = (engineering(one, None, port.displacement_unit) for one in (reached, end))
     sentence = (
-        f"softening_stiffness at {port.name}: displacement {reached:.3g} {port.displacement_unit} leaves the valid "
-        f"range of {end:.3g} {port.displacement_unit}; beyond it the joint's force was kept constant"
+        f"softening_stiffness at {port.name}: displacement {told} leaves the valid range of {valid}; beyond it the "
+        "joint's force was kept constant"
     )
     return (sentence,)
 

@@ -8,8 +8,8 @@ from typing import Self
 from chladni.models.core.parameter import Parameter
 from chladni.signals.errors import ModelError, SetupError
 from chladni.signals.text_reading import real_number
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.units import parse_quantity, si_factor
-from chladni.viewers.labels import printed_unit
 
 STEPS = 100
 _EXPONENT = re.compile(r"e\+?(-?)0*(?=\d)")

@@ -22,10 +22,10 @@ from chladni.models.core.reading import Scale
 from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.bench.curve_points import inline, thinned
 from chladni.viewers.bench.theme import Theme
 from chladni.viewers.bench.tile import TICK_JS
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.overlays import Overlay
 from chladni.viewers.stabilisation import frequency_range, order_range, title
 from chladni.viewers.style import STATUS_ON_DARK, STATUS_ON_LIGHT

@@ -9,8 +9,8 @@ import numpy as np
 
 from chladni.models.core.reading import InfluenceTable, Quantity
 from chladni.signals.arrays import Mask, Real
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.visible import visible
-from chladni.viewers.labels import printed_unit
 
 DASH = "–"
 _EXPONENT = re.compile(r"\^(-?\d+)")

@@ -4,10 +4,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chladni.signals.unit_text import printed_unit
 from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import Style
 
 HEIGHT_IN = 2.9

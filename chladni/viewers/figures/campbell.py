@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 
 from chladni.signals.arrays import Real
 from chladni.signals.order_spectra import OrderCuts
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.figures.sheet import legend, paint, plain, sheet
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import ON_LIGHT
 
 RPM = 60.0

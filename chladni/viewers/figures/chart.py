@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from chladni.models.core.reading import Chart, Curve
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.figures.log_axis import logarithmic, power_of_ten
 from chladni.viewers.figures.panes import pages
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import ON_LIGHT
 
 HEIGHT_IN = 2.3

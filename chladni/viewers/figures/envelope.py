@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from chladni.signals.envelope import EnvelopeSpectrum, Kurtogram
 from chladni.signals.study import Study
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.figures.peak_labels import STRIP_POINTS, label_peaks
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import ON_LIGHT, Colour, Style
 
 KURTOGRAM_IN, SPECTRUM_IN = 1.7, 2.3

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chladni.gap.records.diagnosis import BandShare, Diagnosis
-from chladni.viewers.engineering import percent, span
+from chladni.signals.engineering import percent, span
 from chladni.viewers.figures.sheet import WIDTH_IN, look, paint, plain
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, GapEvidence
 from chladni.viewers.gap_tables import places_of, site_title, sites_named, where_told

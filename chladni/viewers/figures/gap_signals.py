@@ -8,12 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chladni.gap.records.diagnosis import Diagnosis, GapSignals
+from chladni.signals.engineering import engineering
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.drawing import thin, with_breaks
-from chladni.viewers.engineering import engineering
 from chladni.viewers.figures.panes import pages
 from chladni.viewers.figures.sheet import look, paint, plain, sheet
 from chladni.viewers.gap_evidence import AFTER_ON_LIGHT, BEFORE_ON_LIGHT, MEASURED_ON_LIGHT, Evidence, GapEvidence
-from chladni.viewers.labels import printed_unit
 
 # Several a pixel at 300 dots an inch: what is left out can't be seen, and a report's plot can be zoomed.
 POINTS = 8000

@@ -10,11 +10,11 @@ from chladni.signals.arrays import Real
 from chladni.signals.levels import Levels, RunningLevels, Severity
 from chladni.signals.study import Study
 from chladni.signals.time_series import NS_PER_S
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.drawing import with_breaks
 from chladni.viewers.figures.log_axis import logarithmic
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import Style
 
 HEIGHTS_IN = [2.0, 1.2]

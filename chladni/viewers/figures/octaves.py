@@ -8,11 +8,11 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from chladni.signals.arrays import Real
 from chladni.signals.levels import OctaveLevels
 from chladni.signals.study import Study
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.drawing import decibels_of_power, level_limits
 from chladni.viewers.figures.log_axis import logarithmic
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import Style
 
 HEIGHT_IN = 2.7

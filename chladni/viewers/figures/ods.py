@@ -6,10 +6,10 @@ from matplotlib.figure import Figure
 
 from chladni.signals.channel import labels_of
 from chladni.signals.deflection_shapes import DeflectionShapes
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.figures.panes import pages
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import ON_LIGHT
 
 HEIGHT_IN = 1.5

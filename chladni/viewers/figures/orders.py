@@ -10,12 +10,13 @@ from matplotlib.figure import Figure
 from chladni.signals.arrays import Real
 from chladni.signals.channel import labels_of
 from chladni.signals.order_spectra import OrderCuts, OrderMap
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.drawing import block_maximum, decibels_of_amplitude, phase_wraps, with_breaks
 from chladni.viewers.figures.campbell import RPM, campbell_figure, order_title
 from chladni.viewers.figures.log_axis import logarithmic
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.figures.waterfall import DYNAMIC_RANGE_DB, MISSING, PIXELS
-from chladni.viewers.labels import decibel_unit, printed_unit
+from chladni.viewers.labels import decibel_unit
 from chladni.viewers.style import ON_LIGHT
 
 MAP_IN, CUTS_IN = 3.0, (2.2, 1.2)

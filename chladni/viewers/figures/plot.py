@@ -34,6 +34,7 @@ from chladni.signals.sine_vibration import SineCheck, SineProfile
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.signals.study import Study
 from chladni.signals.time_series import TimeSeries
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.value import Value
 from chladni.signals.waterfall import Waterfall
 from chladni.spectral.amplitude_spectrum import AmplitudeSpectrum
@@ -62,7 +63,6 @@ from chladni.viewers.figures.stabilisation import HEIGHT_IN as STABILISATION_IN
 from chladni.viewers.figures.stabilisation import draw_stabilisation
 from chladni.viewers.figures.waveforms import POINTS
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.mode_tables import hertz, mode_ticks
 from chladni.viewers.panels import panels
 from chladni.viewers.style import ON_LIGHT, Style

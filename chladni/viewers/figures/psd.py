@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 from chladni.signals.peak import Peak
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.study import Study
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.drawing import decibels_of_power, level_limits
 from chladni.viewers.figures.log_axis import USUAL, Scales
 from chladni.viewers.figures.peak_labels import STRIP_POINTS, label_peaks
 from chladni.viewers.figures.sheet import BAND_OPACITY, BANDS_OF, legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import Style
 
 HEIGHT_IN = 2.9

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from chladni.signals.arrays import Real
 from chladni.signals.power_spectral_density import PowerSpectralDensity
 from chladni.signals.random_vibration import ProbabilityDensity, RandomProfile, VibrationResponse
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.units import power_density_unit, si_factor
 from chladni.viewers.figures.log_axis import logarithmic, logarithmic_frequency
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import Style
 
 HEIGHT_IN = 3.2

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from chladni.gap.records.diagnosis import RestoringForce
-from chladni.viewers.engineering import axis_scale
+from chladni.signals.engineering import axis_scale
 from chladni.viewers.figures.sheet import WIDTH_IN, look, paint, plain
 from chladni.viewers.gap_evidence import MEASURED_ON_LIGHT, GapEvidence
 from chladni.viewers.gap_tables import force_title

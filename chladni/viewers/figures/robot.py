@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from chladni.gap.records.diagnosis import GapSignals
 from chladni.gap.records.robot import JointMotion, Over, TorqueMap, site_words
 from chladni.signals.arrays import Real
+from chladni.signals.engineering import axis_scale, percent
 from chladni.viewers.drawing import thin, with_breaks
-from chladni.viewers.engineering import axis_scale, percent
 from chladni.viewers.figures.gap_signals import AFTER, BEFORE, LEGEND
 from chladni.viewers.figures.panes import pages, panes
 from chladni.viewers.figures.sheet import look, plain

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from chladni.signals.shock_response import ShockResponse
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.figures.log_axis import logarithmic, logarithmic_frequency
 from chladni.viewers.figures.sheet import BANDS_OF, legend, look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import Style
 
 HEIGHT_IN = 3.2

@@ -10,11 +10,11 @@ from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
 from chladni.signals.study import Study
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.drawing import decibels_of_amplitude, level_limits
 from chladni.viewers.figures.log_axis import USUAL, Scales, logarithmic, logarithmic_frequency
 from chladni.viewers.figures.sheet import legend, look, paint, sheet
 from chladni.viewers.figures.upright import STRIP_POINTS, name_above
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.stabilisation import STATUS_NAMES, frequency_range, order_range, title
 from chladni.viewers.style import STATUS_ON_LIGHT
 

@@ -6,10 +6,10 @@ from matplotlib.figure import Figure
 
 from chladni.signals.arrays import Real
 from chladni.signals.study import Study
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.drawing import decibels_of_amplitude, level_limits, line_breaks, with_breaks
 from chladni.viewers.figures.log_axis import USUAL, Scales
 from chladni.viewers.figures.sheet import legend, look, paint, plain, sheet
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.overlays import Overlay, OverlayPage, left_out, overlay_pages
 from chladni.viewers.style import Style
 

@@ -11,8 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 from chladni.signals.arrays import Whole
 from chladni.signals.trend import Trend, TrendKind
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.figures.sheet import look, paint, plain, sheet
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import ON_LIGHT
 
 #: More panes above one another are too flat for a page.

@@ -7,10 +7,10 @@ from matplotlib.figure import Figure
 from chladni.signals.channel import UNKNOWN
 from chladni.signals.study import Study
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.drawing import thin
 from chladni.viewers.figures.sheet import look, paint, plain, sheet
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.style import Style
 
 # Five a pixel at 300 dots an inch: what is left out can't be seen, and a report's plot can be zoomed.

@@ -6,8 +6,8 @@ from chladni.signals.channel import Channel
 from chladni.signals.peak import Peak
 from chladni.signals.provenance import Provenance
 from chladni.signals.study import Study
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.wording import with_sigma
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.report.markup import element, escaped, table
 from chladni.viewers.style import Style, drawn_channels
 

@@ -7,10 +7,10 @@ from typing import Final
 
 from chladni.io.atomic import atomic_write
 from chladni.signals.trend import Trend, no_change_sentence
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.wording import with_sigma
 from chladni.viewers.figures.album import Album
 from chladni.viewers.figures.trends import trend_figures
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.report.markup import element, escaped, table
 from chladni.viewers.report.markup import page as whole_page
 from chladni.viewers.report.pictures import Pictures

@@ -8,9 +8,9 @@ import rerun.blueprint as rrb
 
 from chladni.signals.peak import Peak
 from chladni.signals.study import Study
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.visible import visible
 from chladni.signals.wording import counted, with_sigma
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.mode_tables import Row, mode_table
 from chladni.viewers.style import Style
 

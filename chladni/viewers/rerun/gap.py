@@ -10,9 +10,9 @@ import rerun.blueprint as rrb
 from chladni.gap.records.diagnosis import GapSignals, RestoringForce
 from chladni.io.atomic import atomic_write
 from chladni.signals.time_series import NS_PER_S
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.visible import visible
 from chladni.viewers.gap_evidence import GapEvidence
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.rerun.drawing import new_recording
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.gap_map import draw_gap_maps

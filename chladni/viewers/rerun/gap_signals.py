@@ -7,10 +7,11 @@ import rerun.blueprint as rrb
 from chladni.gap.records.diagnosis import GapSignals
 from chladni.signals.arrays import Real
 from chladni.signals.time_series import NS_PER_S
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.visible import visible
 from chladni.viewers.drawing import thin
 from chladni.viewers.gap_evidence import AFTER_ON_DARK, BEFORE_ON_DARK, MEASURED_ON_DARK
-from chladni.viewers.labels import printed_unit, thinned
+from chladni.viewers.labels import thinned
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.timelines import send_scalars, time_axis, time_index
 from chladni.viewers.style import Colour

@@ -5,8 +5,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from chladni.signals.arrays import Bytes, Real
+from chladni.signals.engineering import percent
 from chladni.signals.visible import visible
-from chladni.viewers.engineering import percent
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.structure_sketch import StructureSketch
 from chladni.viewers.style import amplitude_colours

@@ -6,12 +6,12 @@ import rerun.blueprint as rrb
 
 from chladni.gap.records.diagnosis import RestoringForce
 from chladni.signals.arrays import Bytes, Real
+from chladni.signals.engineering import axis_scale, engineering
 from chladni.signals.time_series import NS_PER_S
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.visible import visible
 from chladni.viewers.drawing import thin
-from chladni.viewers.engineering import axis_scale, engineering
 from chladni.viewers.gap_evidence import AFTER_ON_DARK, MEASURED_ON_DARK
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.rerun.canvas import Canvas
 from chladni.viewers.rerun.timelines import send_scalars, time_axis, time_index
 from chladni.viewers.restoring_force import (

@@ -11,10 +11,10 @@ import rerun.blueprint as rrb
 from chladni.gap.records.robot import JointMotion
 from chladni.robots.shapes import JointPlace, Poses, Shape, turned_to
 from chladni.signals.arrays import Real
+from chladni.signals.engineering import percent
 from chladni.signals.time_series import NS_PER_S
 from chladni.signals.visible import visible
 from chladni.viewers.drawing import with_breaks
-from chladni.viewers.engineering import percent
 from chladni.viewers.gap_evidence import AFTER_ON_DARK, BEFORE_ON_DARK, MEASURED_ON_DARK
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.rerun.timelines import send_columns, send_scalars, time_axis, time_index

@@ -7,8 +7,9 @@ import rerun.blueprint as rrb
 from chladni.signals.arrays import Real
 from chladni.signals.mode_set import ModeSet
 from chladni.signals.study import Study
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.drawing import decibels_of_amplitude, level_limits, line_breaks, with_breaks
-from chladni.viewers.labels import decibel_unit, printed_unit
+from chladni.viewers.labels import decibel_unit
 from chladni.viewers.overlays import Overlay, OverlayPage, left_out, overlay_pages
 from chladni.viewers.rerun.entities import channel_entity, folder
 from chladni.viewers.rerun.lines import draw_line

@@ -9,8 +9,8 @@ import rerun.blueprint as rrb
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.records.robot import Over, TorqueMap, site_words
 from chladni.signals.arrays import Real
+from chladni.signals.engineering import axis_scale
 from chladni.signals.visible import visible
-from chladni.viewers.engineering import axis_scale
 from chladni.viewers.gap_evidence import AFTER_ON_DARK, BEFORE_ON_DARK
 from chladni.viewers.rerun.canvas import Canvas, draw_labels
 from chladni.viewers.rerun.entities import folder

@@ -12,9 +12,9 @@ import rerun.blueprint as rrb
 from chladni.io.atomic import atomic_write
 from chladni.signals.arrays import Whole
 from chladni.signals.trend import Trend, no_change_sentence
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.visible import visible
 from chladni.viewers.figures.trends import SECTIONS, dates_around
-from chladni.viewers.labels import printed_unit
 from chladni.viewers.rerun.drawing import new_recording
 from chladni.viewers.rerun.entities import folder
 from chladni.viewers.style import ON_DARK

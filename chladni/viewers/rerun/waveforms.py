@@ -6,9 +6,10 @@ import rerun.blueprint as rrb
 
 from chladni.signals.study import Study
 from chladni.signals.time_series import NS_PER_S, TimeSeries
+from chladni.signals.unit_text import printed_unit
 from chladni.viewers.drawing import thin, without_repeated_gaps
 from chladni.viewers.groups import Group, groups
-from chladni.viewers.labels import part_of_several, printed_unit, thinned
+from chladni.viewers.labels import part_of_several, thinned
 from chladni.viewers.rerun.entities import channel_entity, folder
 from chladni.viewers.rerun.several_logs import GroupView, over_one_another
 from chladni.viewers.rerun.timelines import send_scalars, time_axis, time_index

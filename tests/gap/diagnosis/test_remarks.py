@@ -37,7 +37,7 @@ def test_parameters_that_are_not_told_are_counted_where_not_all_are_named() -> N
 
 def test_a_constant_that_gets_no_name_is_told() -> None:
     (told,) = remarks(0.5 * EDGE, found_ki=0.5 * EDGE, offsets=(-2e-6, 0.5e-6))
-    assert " is -2e-06 m beside the model all the time: an offset of the sensor, gravity or a tilt; " in told
+    assert " is -2 µm beside the model all the time: an offset of the sensor, gravity or a tilt; " in told
 
 
 def test_a_fit_that_changes_whether_the_model_is_stable_is_told() -> None:

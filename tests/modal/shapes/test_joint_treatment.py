@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from chladni.modal.shapes.joint_treatment import best_joint, treatments
-from chladni.modal.shapes.mode_words import prefixed
 from chladni.modal.shapes.relative_motion import relative_motion
 from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.signals.channel import AXES, Channel
+from chladni.signals.engineering import engineering
 from chladni.signals.geometry import Geometry, Point
 from chladni.signals.modal_scale import ModalScale
 from chladni.signals.mode_set import ModeSet
@@ -120,7 +120,7 @@ def test_the_damper_named_doubles_the_damping() -> None:
         after = arm({one.between[1]: (0.0, one.damper)}).natural_modes()
         # Damping ratios here are 0.4 to 2 %: the second-order part is a few percent of the change.
         assert after.damping_ratio[one.mode] == pytest.approx(2 * modes.damping_ratio[one.mode], rel=0.1)
-        words = f"a damper of {prefixed(one.damper, 'N s/m')} between the two would double the damping"
+        words = f"a damper of {engineering(one.damper, None, 'N s/m')} between the two would double the damping"
         assert words in one.sentence
         assert one.sentence.startswith(f"Mode {one.mode + 1} (")
 

@@ -80,7 +80,7 @@ def test_leaving_the_range_is_flagged(reached: float, flagged: bool) -> None:
     flags = EFFECT.flags(one_body(), _moved(reached))
     assert len(flags) == int(flagged)
     if flagged:
-        assert "softening_stiffness at spring: displacement 0.0139 m leaves the valid range of 0.0115 m" in flags[0]
+        assert "softening_stiffness at spring: displacement 13.9 mm leaves the valid range of 11.5 mm" in flags[0]
 
 
 def test_a_yielding_spring_is_valid_everywhere() -> None:

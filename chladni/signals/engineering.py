@@ -6,8 +6,8 @@ from math import floor, isfinite, log10
 import numpy as np
 
 from chladni.signals.arrays import Real
+from chladni.signals.unit_text import printed_unit
 from chladni.signals.wording import with_sigma
-from chladni.viewers.labels import printed_unit
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 3: "k", 6: "M", 9: "G", 12: "T"}
 # Between these a number is read as easily without a prefix.
