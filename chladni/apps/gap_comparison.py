@@ -215,7 +215,7 @@ def _later(where: Where, offset_s: float) -> Where:
 
 
 def _shares(split: Distortion | None) -> tuple[DistortionShare, ...]:
-    return () if split is None else split.told
+    return () if split is None else split.shares
 
 
 def _split_remarks(view: GapView, moving: Sequence[str]) -> tuple[str, ...]:

@@ -6,56 +6,21 @@ import numpy as np
 from scipy import fft
 
 from chladni.gap.calibration import BLOCK, FEWEST, LINES_A_TERM, LOCAL_TERMS
-from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
+from chladni.gap.comparison.linear_approximation import excited_alone
 from chladni.gap.comparison.local_rational import POLES, output_error
-from chladni.gap.comparison.periodicity import periods_of
+from chladni.gap.comparison.periodicity import steady_periods
 from chladni.gap.records.diagnosis import DistortionShare
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Complex, Index, Mask, Real
 from chladni.signals.errors import EstimateError
-from chladni.signals.value import Value
-from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Distortion(Value):
-    """What a periodic input tells about nonlinearity.
-
-    Attributes
-    ----------
-    shares
-        Output by output, adding up to 1. Empty when even and odd can't be told apart.
-    output_names
-        Names of the rows below.
-    linear, nonlinear, noise
-        ``[output]`` shares of the power: what a linear system gives, distortion of any kind, and what doesn't repeat.
-    remarks
-        What the excitation doesn't allow to be told.
-    """
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Distortion:
+    """What a periodic input tells about nonlinearity, output by output, and what it doesn't allow to be told."""
 
     shares: tuple[DistortionShare, ...]
-    output_names: tuple[str, ...]
-    linear: Real
-    nonlinear: Real
-    noise: Real
     remarks: tuple[str, ...]
-
-    def __post_init__(self) -> None:
-        self._freeze()
-
-    @property
-    def told(self) -> tuple[DistortionShare, ...]:
-        """`shares`; where even and odd can't be told apart, the split without them."""
-        if self.shares:
-            return self.shares
-        return tuple(
-            DistortionShare(
-                output=name, linear=float(linear), even=None, odd=None, noise=float(noise), nonlinear=float(nonlinear)
-            )
-            for name, linear, nonlinear, noise in zip(
-                self.output_names, self.linear, self.nonlinear, self.noise, strict=True
-            )
-        )
 
 
 def distortion_of(measurement: Measurement) -> Distortion | None:
@@ -72,20 +37,27 @@ def distortion_of(measurement: Measurement) -> Distortion | None:
     Distortion or None
         None when the input isn't periodic, has fewer than two steady periods, or several inputs move at once.
     """
-    names = moving_inputs(measurement)
-    spectra = period_spectra(measurement)
-    if spectra is None or len(names) != 1 or measurement.period_samples is None:
+    found = excited_alone(measurement)
+    if found is None or not np.any(found[1]):
         return None
-    power = spectra.density[spectra.index(names[0]), spectra.index(names[0])].real
-    # Of a sine all other lines are rounding errors, which repeat too.
-    excited = excited_lines(spectra, names)[0] & (power > DYNAMIC_RANGE * power.max())
-    if not np.any(excited):
-        return None
+    name, excited = found
     odd_only = not np.any(excited[::2])
-    steady = _steady(measurement.outputs, measurement)
-    u = _spectra(_steady(measurement.inputs[[measurement.input_names.index(names[0])]], measurement).mean(axis=1))[0]
-    splits = [_split(u, periods, excited, odd_only=odd_only) for periods in steady]
-    return _told(splits, measurement.output_names, odd_only=odd_only)
+    steady = steady_periods(measurement.outputs, measurement)
+    row = [measurement.input_names.index(name)]
+    u = _spectra(steady_periods(measurement.inputs[row], measurement).mean(axis=1))[0]
+    splits = [
+        _split(output, u, periods, excited, odd_only=odd_only)
+        for output, periods in zip(measurement.output_names, steady, strict=True)
+    ]
+    remarks = []
+    if not odd_only:
+        remarks.append(
+            "even lines are excited too, so even and odd distortion can't be told apart inside the band; excite odd "
+            "lines only"
+        )
+    if not all(known for _, known in splits):
+        remarks.append("too few lines are excited to tell distortion on them from the linear response")
+    return Distortion(shares=tuple(share for share, _ in splits), remarks=tuple(remarks))
 
 
 def distortion_where_told(measurement: Measurement) -> Distortion | None:
@@ -94,27 +66,6 @@ def distortion_where_told(measurement: Measurement) -> Distortion | None:
         return distortion_of(measurement)
     except EstimateError:
         return None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Split:
-    """Powers of one output; `known` is whether the distortion on excited lines could be told."""
-
-    linear: float
-    even: float
-    odd: float
-    noise: float
-    known: bool
-
-    def share(self, power: float) -> float:
-        """Power over that of the whole output, without its mean."""
-        total = self.linear + self.even + self.odd + self.noise
-        return power / total if total > 0 else 0.0
-
-
-def _steady(signals: Real, measurement: Measurement) -> Real:
-    """``[signal, period, sample]`` after the transient periods."""
-    return periods_of(signals, measurement.period_samples or 1)[:, measurement.transient_periods :]
 
 
 def _spectra(signals: Real) -> Complex:
@@ -127,8 +78,11 @@ def _spectra(signals: Real) -> Complex:
     return np.asarray(lines)
 
 
-def _split(u: Complex, periods: Real, excited: Mask, *, odd_only: bool) -> _Split:
-    """Split one output ``[period, sample]``; with `odd_only` its even lines are no detection lines for odd ones."""
+def _split(output: str, u: Complex, periods: Real, excited: Mask, *, odd_only: bool) -> tuple[DistortionShare, bool]:
+    """Split one output ``[period, sample]``; also whether the distortion on excited lines could be told.
+
+    With `odd_only` its even lines are no detection lines for odd ones.
+    """
     count = len(periods)
     spectra = _spectra(periods)
     y = spectra.mean(axis=0)
@@ -145,13 +99,19 @@ def _split(u: Complex, periods: Real, excited: Mask, *, odd_only: bool) -> _Spli
     answered = max(float(repeated[excited].sum()), 0.0)
     # Distortion can't be more than what is there.
     on_excited = min(max(told or 0.0, 0.0), answered)
-    return _Split(
-        linear=answered - on_excited,
-        even=max(even, 0.0),
-        odd=max(beside, 0.0) + on_excited,
-        noise=float(scatter.sum()),
-        known=told is not None,
+    linear, noise = answered - on_excited, float(scatter.sum())
+    even, odd = max(even, 0.0), max(beside, 0.0) + on_excited
+    whole = linear + even + odd + noise
+    share = [power / whole if whole > 0 else 0.0 for power in (linear, even, odd, noise, even + odd)]
+    split = DistortionShare(
+        output=output,
+        linear=share[0],
+        even=share[1] if odd_only else None,
+        odd=share[2] if odd_only else None,
+        noise=share[3],
+        nonlinear=share[4],
     )
+    return split, told is not None
 
 
 def _detected(repeated: Real, excited: Mask, *, step: int) -> float | None:
@@ -183,33 +143,3 @@ def _roughness(u: Complex, y: Complex, noise: Real, line: Index) -> float | None
     left = output_error(u[index][:, :, None], y[index], (places - centre) / half)
     power = np.mean(np.abs(left) ** 2) * size / (size - LOCAL_TERMS - POLES) - noise.mean()
     return float(power * u.size)
-
-
-def _told(splits: list[_Split], names: tuple[str, ...], *, odd_only: bool) -> Distortion:
-    remarks = []
-    if not odd_only:
-        remarks.append(
-            "even lines are excited too, so even and odd distortion can't be told apart inside the band; excite odd "
-            "lines only"
-        )
-    if not all(split.known for split in splits):
-        remarks.append("too few lines are excited to tell distortion on them from the linear response")
-    shares = [
-        DistortionShare(
-            output=name,
-            linear=split.share(split.linear),
-            even=split.share(split.even),
-            odd=split.share(split.odd),
-            noise=split.share(split.noise),
-            nonlinear=split.share(split.even + split.odd),
-        )
-        for name, split in zip(names, splits, strict=True)
-    ]
-    return Distortion(
-        shares=tuple(shares) if odd_only else (),
-        output_names=names,
-        linear=np.array([one.linear for one in shares]),
-        nonlinear=np.array([one.nonlinear for one in shares]),
-        noise=np.array([one.noise for one in shares]),
-        remarks=tuple(remarks),
-    )

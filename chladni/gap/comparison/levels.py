@@ -1,6 +1,6 @@
 """What changes with the level of excitation: resonances, and the share that no linear system gives."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from chladni.gap.comparison.linear_approximation import best_linear_approximatio
 from chladni.gap.comparison.local_rational import local_fit
 from chladni.gap.comparison.outside_band import ProductsOutside, products_outside
 from chladni.gap.records.measurement import Measurement
+from chladni.signals.arrays import Real
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.peak import Peak
 from chladni.spectral.peaks import find_response_peaks
@@ -35,7 +36,7 @@ class LevelResponse:
     log: str
     level: float
     response: FrequencyResponse
-    nonlinear: tuple[float, ...]
+    nonlinear: Mapping[str, float]
     outside: ProductsOutside | None = None
 
 
@@ -45,13 +46,13 @@ def level_responses(measurements: Sequence[Measurement]) -> tuple[LevelResponse,
     if not moving:
         return ()
     # One input for all logs, so that the levels mean the same.
-    name = moving_inputs(moving[0])[int(np.argmax([_level(moving[0], one) for one in moving_inputs(moving[0])]))]
+    name = moving_inputs(moving[0])[int(np.argmax([level_of(moving[0], one) for one in moving_inputs(moving[0])]))]
     levels = [
         LevelResponse(
             log=one.log,
-            level=_level(one, name),
+            level=level_of(one, name),
             response=best_linear_approximation(one),
-            nonlinear=_nonlinear(one),
+            nonlinear=dict(zip(one.output_names, _nonlinear(one).tolist(), strict=True)),
             outside=products_outside(one),
         )
         for one in moving
@@ -83,10 +84,9 @@ def compare_levels(measurements: Sequence[Measurement]) -> tuple[str, ...]:
         return ()
     if levels[-1].level < ALIKE * levels[0].level:
         return (f"the levels differ by less than {ALIKE - 1:.0%}: they tell nothing about nonlinearity",)
-    outputs = [channel.name for channel in levels[0].response.responses]
     # A sensor that one log lacks can't be compared.
-    told = [_of_output(output, levels) for output in outputs if _everywhere(output, levels)]
-    return (*(sentence for sentences in told for sentence in sentences), *_parity(levels))
+    outputs = [name for name in levels[0].nonlinear if all(name in one.nonlinear for one in levels)]
+    return (*(sentence for name in outputs for sentence in _of_output(name, levels)), *_parity(levels))
 
 
 def _parity(levels: Sequence[LevelResponse]) -> list[str]:
@@ -98,10 +98,6 @@ def _parity(levels: Sequence[LevelResponse]) -> list[str]:
     ]
 
 
-def _everywhere(output: str, levels: Sequence[LevelResponse]) -> bool:
-    return all(output in [channel.name for channel in one.response.responses] for one in levels)
-
-
 def _of_output(output: str, levels: Sequence[LevelResponse]) -> list[str]:
     reference = levels[0].response.references[0].name
     # Levels alone say nothing without the input that they are levels of.
@@ -110,7 +106,7 @@ def _of_output(output: str, levels: Sequence[LevelResponse]) -> list[str]:
     peaks = followed_peak(output, levels)
     if peaks is not None:
         sentences.append(f"{output}: {_resonance(peaks[0], peaks[-1])} {span}")
-    first, last = (_nonlinear_of(output, one) for one in (levels[0], levels[-1]))
+    first, last = levels[0].nonlinear[output], levels[-1].nonlinear[output]
     if last > CLEARLY * first and last > NOTICED:
         sentences.append(
             f"{output}: what no linear system gives grows from {first:.2g} to {last:.2g} of its RMS {span}"
@@ -157,24 +153,19 @@ def _resonance(first: Peak, last: Peak) -> str:
     return f"its resonance{at} {' and '.join(parts)}"
 
 
-def _level(measurement: Measurement, name: str) -> float:
+def level_of(measurement: Measurement, name: str) -> float:
+    """RMS of an input about its mean."""
     return float(np.std(measurement.inputs[measurement.input_names.index(name)]))
 
 
-def _nonlinear(measurement: Measurement) -> tuple[float, ...]:
-    """RMS share by output; without a period noise is in it."""
+def _nonlinear(measurement: Measurement) -> Real:
+    """``[output]`` RMS share; without a period noise is in it."""
     # Periods tell noise apart; without them the residual of a linear fit is all there is.
     distortion = distortion_of(measurement)
     if distortion is not None:
-        return tuple(float(share) for share in np.sqrt(distortion.nonlinear))
+        return np.asarray(np.sqrt([one.nonlinear for one in distortion.shares]))
     spectra = local_fit(measurement.inputs, measurement.outputs)
     if spectra is None:
-        return (0.0,) * len(measurement.output_names)
+        return np.zeros(len(measurement.output_names))
     power, whole = spectra.densities().mean(axis=1), np.var(measurement.outputs, axis=1)
-    shares = np.divide(power, whole, out=np.zeros_like(power), where=whole > 0)
-    return tuple(float(share) for share in np.sqrt(shares))
-
-
-def _nonlinear_of(output: str, level: LevelResponse) -> float:
-    names = [channel.name for channel in level.response.responses]
-    return level.nonlinear[names.index(output)]
+    return np.asarray(np.sqrt(np.divide(power, whole, out=np.zeros_like(power), where=whole > 0)))

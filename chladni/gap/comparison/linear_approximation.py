@@ -4,12 +4,14 @@ import numpy as np
 
 from chladni.gap.comparison.periodicity import periods_of
 from chladni.gap.records.measurement import Measurement
+from chladni.signals.arrays import Mask
 from chladni.signals.channel import Channel
 from chladni.signals.cross_spectra import CrossSpectra
 from chladni.signals.errors import EstimateError
 from chladni.signals.frequency_response import FrequencyResponse
 from chladni.signals.time_series import TimeSeries
 from chladni.spectral.cross_spectra import cross_spectra
+from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
 from chladni.spectral.frf import frequency_response
 from chladni.spectral.periodic import Period, periodic_cross_spectra
 
@@ -66,6 +68,17 @@ def moving_inputs(measurement: Measurement) -> list[str]:
         signals = periods_of(signals, measurement.period_samples)[:, -1]
     moves = np.ptp(signals, axis=1) > 0
     return [name for name, one in zip(measurement.input_names, moves, strict=True) if one]
+
+
+def excited_alone(measurement: Measurement) -> tuple[str, Mask] | None:
+    """Give the only input that moves, and whether it excites each line; None without periods, or of several."""
+    names, spectra = moving_inputs(measurement), period_spectra(measurement)
+    if spectra is None or len(names) != 1:
+        return None
+    row = spectra.index(names[0])
+    power = spectra.density[row, row].real
+    # Of a sine all other lines are rounding errors, which repeat too.
+    return names[0], np.asarray(excited_lines(spectra, names)[0] & (power > DYNAMIC_RANGE * power.max()))
 
 
 def _series(measurement: Measurement) -> TimeSeries:

@@ -1,6 +1,6 @@
 """A simulated log against a measured one: where the gap lies, whatever simulator made it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from chladni.gap.comparison.distortion import Distortion, distortion_where_told
 from chladni.gap.comparison.log_regimes import log_regimes
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
-from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, pooled_gap, regime_shares
+from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, pooled_gap
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.records.diagnosis import Where
 from chladni.gap.records.measurement import Measurement
@@ -57,66 +57,13 @@ class GapView(Value):
         self._freeze()
 
 
-def view_gap(
-    measured: Measurement,
-    simulated: Real,
-    *,
-    noise: NoiseFloor | None = None,
-    modes_hz: Sequence[float] = (),
-    variables: Mapping[str, Real] | None = None,
-) -> GapView:
-    """Say where measured and simulated outputs differ.
-
-    Parameters
-    ----------
-    measured
-        With its period filled in, if it has one; see `with_period`.
-    simulated
-        ``[output, sample]`` of the same experiment.
-    noise
-        Floor of the measured outputs; estimated if None.
-    modes_hz
-        Natural frequencies that bands are cut between; see `band_shares`.
-    variables
-        Motions whose regimes are looked at, ``[sample]`` each, see `regime_shares`; those that the measurement itself
-        holds if None, see `log_regimes`.
-    """
-    residual = measured.outputs - simulated
-    floor = estimate_noise(measured) if noise is None else noise
-    rate_hz = measured.sample_rate_hz
-    map_time_s, map_frequency_hz, map_density = gap_map(residual, measured.outputs, rate_hz)
-    return GapView(
-        residual=residual,
-        gap=pooled_gap(residual, measured.outputs),
-        where=Where(
-            channels=channel_gaps(residual, measured.outputs, floor, output_names=measured.output_names),
-            bands=band_shares(residual, measured.outputs, sample_rate_hz=rate_hz, modes_hz=modes_hz, noise=floor),
-            sites=(),
-            regimes=(
-                log_regimes(residual, measured)
-                if variables is None
-                else regime_shares(residual, measured.outputs, variables)
-            ),
-            times=time_shares(residual, measured.outputs, sample_rate_hz=rate_hz),
-        ),
-        noise=floor,
-        map_time_s=map_time_s,
-        map_frequency_hz=map_frequency_hz,
-        map_density=map_density,
-    )
-
-
-def compare_logs(
-    measured: Measurement, simulated: Measurement, *, variables: Mapping[str, Real] | None = None
-) -> GapView:
+def compare_logs(measured: Measurement, simulated: Measurement) -> GapView:
     """Compare a measured log with one that any simulator wrote, of the same experiment.
 
     Parameters
     ----------
     measured, simulated
         Outputs are matched by name. Both begin with the same sample; the longer one is cut.
-    variables
-        As for `view_gap`, ``[sample]`` of the measurement.
 
     Raises
     ------
@@ -134,10 +81,23 @@ def compare_logs(
     # Cutting may leave fewer periods than were found before.
     ours, theirs = with_period(_cut(measured, names, samples)), _cut(simulated, names, samples)
     _require_same_units(ours, theirs)
-    # Variables belong to the measurement's clock and are cut with it.
-    kept = None if variables is None else {name: values[:samples] for name, values in variables.items()}
-    return replace(
-        view_gap(ours, theirs.outputs, variables=kept),
+    outputs, rate_hz, noise = ours.outputs, ours.sample_rate_hz, estimate_noise(ours)
+    residual = outputs - theirs.outputs
+    map_time_s, map_frequency_hz, map_density = gap_map(residual, outputs, rate_hz)
+    return GapView(
+        residual=residual,
+        gap=pooled_gap(residual, outputs),
+        where=Where(
+            channels=channel_gaps(residual, outputs, noise, output_names=ours.output_names),
+            bands=band_shares(residual, outputs, sample_rate_hz=rate_hz, noise=noise),
+            sites=(),
+            regimes=log_regimes(residual, ours),
+            times=time_shares(residual, outputs, sample_rate_hz=rate_hz),
+        ),
+        noise=noise,
+        map_time_s=map_time_s,
+        map_frequency_hz=map_frequency_hz,
+        map_density=map_density,
         measured_split=distortion_where_told(ours),
         simulated_split=distortion_where_told(with_period(theirs)),
         remarks=_remarks(measured, simulated, samples),

@@ -3,24 +3,16 @@
 No joint's motion is known without a model; what the log itself holds of displacement, velocity and amplitude is.
 """
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from scipy import fft
 
 from chladni.gap.calibration import CYCLES
-from chladni.gap.comparison.shares import regime_shares
+from chladni.gap.comparison.shares import Variable, regime_shares
 from chladni.gap.records.diagnosis import RegimeShare
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Real
 
 MOTION_UNITS = frozenset({"m", "rad", "m/s", "rad/s"})
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Variable:
-    values: Real
-    unit: str
 
 
 def log_regimes(residual: Real, measured: Measurement) -> tuple[RegimeShare, ...]:
@@ -38,12 +30,15 @@ def log_regimes(residual: Real, measured: Measurement) -> tuple[RegimeShare, ...
         Its outputs in m, rad, m/s and rad/s are variables by their names; the amplitude of every output is one, as
         ``amplitude of wrist``, see `amplitude`, over four cycles of its mean frequency.
     """
-    variables = _variables(measured)
-    signals = {name: one.values for name, one in variables.items()}
-    return tuple(
-        replace(one, unit="" if variables[one.variable].unit == "1" else variables[one.variable].unit)
-        for one in regime_shares(residual, measured.outputs, signals, beyond_motion=True)
-    )
+    rows = list(zip(measured.output_names, measured.output_units, measured.outputs, strict=True))
+    motions = {name: Variable(row, unit) for name, unit, row in rows if unit in MOTION_UNITS}
+    amplitudes = {
+        f"amplitude of {name}": Variable(
+            amplitude(row, cycles_of(row, measured.sample_rate_hz)), "" if unit == "1" else unit
+        )
+        for name, unit, row in rows
+    }
+    return regime_shares(residual, measured.outputs, motions | amplitudes, beyond_motion=True)
 
 
 def cycles_of(signal: Real, sample_rate_hz: float) -> int:
@@ -53,16 +48,6 @@ def cycles_of(signal: Real, sample_rate_hz: float) -> int:
         return signal.size
     mean_hz = float(np.sum(power * fft.rfftfreq(signal.size, 1 / sample_rate_hz)) / power.sum())
     return round(CYCLES / mean_hz * sample_rate_hz)
-
-
-def _variables(measured: Measurement) -> dict[str, _Variable]:
-    rows = list(zip(measured.output_names, measured.output_units, measured.outputs, strict=True))
-    motions = {name: _Variable(values=row, unit=unit) for name, unit, row in rows if unit in MOTION_UNITS}
-    amplitudes = {
-        f"amplitude of {name}": _Variable(values=amplitude(row, cycles_of(row, measured.sample_rate_hz)), unit=unit)
-        for name, unit, row in rows
-    }
-    return motions | amplitudes
 
 
 def amplitude(signal: Real, length: int) -> Real:

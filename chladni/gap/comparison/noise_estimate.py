@@ -8,7 +8,6 @@ from scipy import fft
 from chladni.gap.calibration import (
     CLEARLY,
     FAR,
-    FEWEST_SAMPLES,
     GRID,
     HARDLY_ANY,
     LINES_A_TERM,
@@ -19,13 +18,11 @@ from chladni.gap.calibration import (
     SOME,
 )
 from chladni.gap.comparison.local_rational import POLES, ResidualSpectra, local_fit
-from chladni.gap.comparison.periodicity import periods_of
+from chladni.gap.comparison.periodicity import steady_periods
 from chladni.gap.comparison.whitening import noise_floor_of
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Mask, Real
-from chladni.signals.errors import EstimateError
-from chladni.spectral.windows import window_samples
 
 
 def estimate_noise(measurement: Measurement) -> NoiseFloor:
@@ -52,8 +49,11 @@ def estimate_noise(measurement: Measurement) -> NoiseFloor:
 
 def _of_periods_or_fit(measurement: Measurement) -> NoiseFloor:
     fitted = _of_fit(measurement)
-    steady = _steady_periods(measurement)
-    spectra = None if steady is None else _between_periods(steady)
+    spectra = (
+        None
+        if measurement.period_samples is None
+        else _between_periods(steady_periods(measurement.outputs, measurement))
+    )
     if spectra is None:
         return fitted
     outputs = measurement.outputs
@@ -85,44 +85,6 @@ def _of_fit(measurement: Measurement) -> NoiseFloor:
     return replace(floor, upper_bound=shared | _louder_than_quiet(spectra, outputs))
 
 
-def noise_of_residual(residual: Real, *, sample_rate_hz: float, method: str = "explained residual") -> NoiseFloor:
-    """Estimate the noise from ``[output, sample]`` that a fitted model leaves; it's an upper bound.
-
-    The spectrum is averaged over Hann segments of 512 samples (or an eighth of the record) with half overlap.
-    `sample_rate_hz` must be positive; densities are in cycles a sample, so it doesn't change the result.
-    """
-    if not sample_rate_hz > 0:
-        raise EstimateError(f"sample_rate_hz {sample_rate_hz} must be positive")
-    samples = residual.shape[1]
-    length = min(samples, max(FEWEST_SAMPLES // 2, min(GRID // 2, samples // 8)))
-    window = window_samples("hann", length)
-    hop = max(1, length // 2)
-    segments = np.lib.stride_tricks.sliding_window_view(residual, length, axis=1)[:, ::hop]
-    density = np.mean(np.abs(fft.rfft(segments * window, axis=2)) ** 2, axis=1)
-    mean_square = np.mean(residual**2, axis=1, keepdims=True)
-    spread = _on_grid(density, _line_edges(length))
-    # The mean square itself is known better than its spread over lines; the window shifts some at the ends.
-    mean_density = fft.irfft(spread, axis=1)[:, :1]
-    scaled = np.divide(mean_square, mean_density, out=np.zeros_like(mean_square), where=mean_density > 0) * spread
-    with np.errstate(invalid="ignore", divide="ignore"):
-        lines = np.sum(density, axis=1) ** 2 / np.sum(density**2, axis=1)
-    return noise_floor_of(
-        scaled,
-        samples=samples,
-        # Lines of one segment, as independent as its window lets them be, times segments without overlap.
-        freedom=np.nan_to_num(2 * lines * samples / length, nan=1.0),
-        method=(method,) * len(residual),
-        upper_bound=np.ones(len(residual), dtype=np.bool_),
-        scale=np.sqrt(mean_square[:, 0]),
-    )
-
-
-def _line_edges(length: int) -> Real:
-    """Edges of the lines of a segment, halfway between neighbours."""
-    inner = (np.arange(length // 2) + 0.5) / length
-    return np.concatenate([[0.0], inner, [0.5]])
-
-
 def smaller_floor(first: NoiseFloor, second: NoiseFloor) -> NoiseFloor:
     """Give, output by output, the floor that is lower; both hold the same outputs."""
     return chosen_floor(second.rms < first.rms, first, second)
@@ -143,17 +105,11 @@ def chosen_floor(lower: Mask, first: NoiseFloor, second: NoiseFloor) -> NoiseFlo
     )
 
 
-def _steady_periods(measurement: Measurement) -> Real | None:
-    """``[output, period, sample]`` after the transient ones; None with fewer than two."""
-    if measurement.period_samples is None:
-        return None
-    steady = periods_of(measurement.outputs, measurement.period_samples)[:, measurement.transient_periods :]
-    return steady if steady.shape[1] >= 2 else None
-
-
 def _between_periods(periods: Real) -> ResidualSpectra | None:
-    """Spectra of what differs between periods; None when a period is too short for that."""
+    """Spectra of what differs between two periods and more; None when one is too short for that."""
     count, samples = periods.shape[1:]
+    if count < 2:
+        return None
     about_mean = (periods - periods.mean(axis=1, keepdims=True)) * np.sqrt(count / (count - 1))
     steps = np.diff(periods, axis=1) / np.sqrt(2)
     drifts = np.mean(about_mean**2) > SAME**2 * np.mean(steps**2)

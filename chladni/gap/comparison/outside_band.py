@@ -8,12 +8,11 @@ import numpy as np
 from scipy import fft
 
 from chladni.gap.calibration import FAR, FEWEST, NOTICED, SMOOTH
-from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
+from chladni.gap.comparison.linear_approximation import excited_alone
 from chladni.gap.comparison.local_rational import unreached
-from chladni.gap.comparison.periodicity import periods_of
+from chladni.gap.comparison.periodicity import steady_periods
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Complex, Index, Mask, Real
-from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
 from chladni.spectral.forms import MOTION_ORDER
 
 #: What the basis answers with is taken for smooth over so many lines: a straight line over them.
@@ -66,17 +65,12 @@ def products_outside(measurement: Measurement) -> ProductsOutside | None:
         None without a period or with several inputs, where the band leaves no room below half the sample rate, or
         where noise is all there is.
     """
-    names = moving_inputs(measurement)
-    spectra = period_spectra(measurement)
-    if spectra is None or len(names) != 1:
+    found = excited_alone(measurement)
+    index = None if found is None else _blocks(found[1])
+    if found is None or index is None:
         return None
-    power = spectra.density[spectra.index(names[0]), spectra.index(names[0])].real
-    excited = excited_lines(spectra, names)[0] & (power > DYNAMIC_RANGE * power.max())
-    index = _blocks(excited)
-    if index is None:
-        return None
-    period = int(measurement.period_samples or 1)
-    periods = fft.rfft(periods_of(measurement.outputs, period)[:, measurement.transient_periods :], axis=2)
+    excited, period = found[1], int(measurement.period_samples or 1)
+    periods = fft.rfft(steady_periods(measurement.outputs, measurement), axis=2)
     mean = periods.mean(axis=1)
     noise = np.mean(np.abs(periods - mean[:, None]) ** 2, axis=1) / (periods.shape[1] - 1)
     loud = (np.abs(mean[:, index]) ** 2).mean(axis=2) > FAR * noise[:, index].mean(axis=2)
@@ -84,8 +78,8 @@ def products_outside(measurement: Measurement) -> ProductsOutside | None:
         return None
     index = index[np.all(loud, axis=0)]
     motions = _motions(measurement, mean, excited, period)
-    found = [_explained(name, motion, mean, index) for name, motion in motions]
-    return max(found, key=lambda one: one.both, default=None)
+    explained = [_explained(name, motion, mean, index) for name, motion in motions]
+    return max(explained, key=lambda one: one.both, default=None)
 
 
 def _blocks(excited: Mask) -> Index | None:

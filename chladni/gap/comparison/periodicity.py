@@ -1,6 +1,6 @@
 """Whether all inputs of a measurement repeat, with which period, and from when on the outputs repeat too."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy import fft
@@ -21,40 +21,13 @@ from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Real
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Repetition:
-    """How a measurement repeats.
-
-    Attributes
-    ----------
-    period_samples
-        Length of a period.
-    periods
-        Whole periods in the log, transient ones included.
-    transient_periods
-        Periods at the start in which the outputs (or inputs) haven't settled.
-    input_scatter
-        RMS of what doesn't repeat over RMS of what does, the largest of all inputs.
-    """
-
-    period_samples: int
-    periods: int
-    transient_periods: int
-    input_scatter: float
-
-
-def find_repetition(measurement: Measurement) -> Repetition | None:
-    """Find the shortest whole number of samples after which every input repeats.
+def with_period(measurement: Measurement) -> Measurement:
+    """Give the measurement with the shortest period after which every input repeats, and the periods that settle.
 
     A lag is a candidate where the inputs' correlation with themselves has a maximum; it's a period when what
     doesn't repeat is at most 4 % of every input, and as small (within a quarter) as at the best candidate. Any shape
-    repeats: multisines, sines, trains of hits.
-
-    Returns
-    -------
-    Repetition or None
-        None when an input doesn't repeat, none moves, or fewer than two periods are there. With two periods of
-        which the first hasn't settled, ``transient_periods`` is 1 and no scatter is known.
+    repeats: multisines, sines, trains of hits. There's none when an input doesn't repeat, none moves, or fewer than
+    two periods are there.
 
     Examples
     --------
@@ -62,39 +35,30 @@ def find_repetition(measurement: Measurement) -> Repetition | None:
     >>> u = np.tile(rng.standard_normal((1, 100)), 5)
     >>> one = Measurement(log="a", sample_rate_hz=1e2, inputs=u, outputs=2 * u, input_names=("f",),
     ...                   output_names=("y",), output_units=("m",))
-    >>> found = find_repetition(one)
-    >>> found.period_samples, found.periods, found.transient_periods
-    (100, 5, 0)
+    >>> found = with_period(one)
+    >>> found.period_samples, found.transient_periods
+    (100, 0)
     """
     moving = measurement.inputs[np.ptp(measurement.inputs, axis=1) > 0]
-    if not moving.size:
-        return None
-    tried = [(lag, _scatter(moving, lag)) for lag in _candidates(moving)]
-    repeating = [(lag, scatter) for lag, scatter in tried if scatter <= SAME * NOTICED]
-    if not repeating:
-        return None
-    best = min(scatter for _, scatter in repeating)
-    period, scatter = next(one for one in repeating if one[1] <= SAME * best + UNNOTICED)
-    return Repetition(
-        period_samples=period,
-        periods=measurement.samples // period,
-        transient_periods=transient_periods(np.concatenate([measurement.outputs, moving]), period),
-        input_scatter=scatter,
-    )
-
-
-def with_period(measurement: Measurement) -> Measurement:
-    """Give the measurement with its period and transient periods filled in, where its inputs repeat."""
-    found = find_repetition(measurement)
-    if found is None:
-        return replace(measurement, period_samples=None, transient_periods=0)
-    return replace(measurement, period_samples=found.period_samples, transient_periods=found.transient_periods)
+    tried = [(lag, _scatter(moving, lag)) for lag in _candidates(moving)] if moving.size else []
+    best = min((scatter for _, scatter in tried), default=np.inf)
+    enough = min(SAME * NOTICED, SAME * best + UNNOTICED)
+    period = next((lag for lag, scatter in tried if scatter <= enough), None)
+    transient = 0
+    if period is not None:
+        transient = transient_periods(np.concatenate([measurement.outputs, moving]), period)
+    return replace(measurement, period_samples=period, transient_periods=transient)
 
 
 def periods_of(signals: Real, period: int) -> Real:
     """Cut ``[signal, sample]`` into ``[signal, period, sample]``; what's left behind the last one is dropped."""
     count = signals.shape[1] // period
     return signals[:, : count * period].reshape(len(signals), count, period)
+
+
+def steady_periods(signals: Real, measurement: Measurement) -> Real:
+    """Cut signals of a measurement with a period as `periods_of` does, and leave the transient ones out."""
+    return periods_of(signals, measurement.period_samples or 1)[:, measurement.transient_periods :]
 
 
 def transient_periods(signals: Real, period: int) -> int:

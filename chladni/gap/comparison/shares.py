@@ -31,13 +31,12 @@ from chladni.signals.errors import EstimateError
 from chladni.spectral.windows import window_samples
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Regime:
-    """A regime found, and by how much its share of the gap exceeds its share of time."""
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A motion that regimes are cut by: ``values [sample]``, SI, and their unit; empty where that isn't known."""
 
-    told: RegimeShare
-    excess: float
-    inside: tuple[float, float]
+    values: Real
+    unit: str = ""
 
 
 def relative_residual(residual: Real, measured: Real) -> Real:
@@ -80,10 +79,11 @@ def band_shares(
     measured: Real,
     *,
     sample_rate_hz: float,
-    modes_hz: Sequence[float] = (),
     noise: NoiseFloor | None = None,
 ) -> tuple[BandShare, ...]:
     """Split the gap's power over frequency.
+
+    In ten bands of equal ratio between the frequencies that hold all but 0.1 % of what was measured and of the gap.
 
     Parameters
     ----------
@@ -91,9 +91,6 @@ def band_shares(
         ``[output, sample]``.
     sample_rate_hz
         Samples a second.
-    modes_hz
-        Natural frequencies: bands end halfway between neighbours (geometric mean). Without any, ten bands of equal
-        ratio between the frequencies that hold all but 0.1 % of what was measured and of the gap.
     noise
         Floor of the outputs: how much of the gap in each band it can be is told too.
 
@@ -106,7 +103,7 @@ def band_shares(
     frequency_hz = fft.rfftfreq(samples, 1 / sample_rate_hz)
     # One transform of the whole record: no window shifts power between bands, and shares add up.
     gap, whole = (_line_power(relative_residual(one, measured)) for one in (residual, measured))
-    edges_hz = _mode_edges_hz(modes_hz, frequency_hz) if len(modes_hz) else _log_edges_hz(gap, whole, frequency_hz)
+    edges_hz = _edges_hz(gap, whole, frequency_hz)
     band = np.clip(np.searchsorted(edges_hz, frequency_hz, side="right") - 1, 0, edges_hz.size - 2)
     power = np.bincount(band, weights=gap, minlength=edges_hz.size - 1).astype(np.float64)
     shares = power / power.sum() if power.sum() > 0 else power
@@ -120,7 +117,7 @@ def band_shares(
 
 
 def regime_shares(
-    residual: Real, measured: Real, variables: Mapping[str, Real], *, beyond_motion: bool = False
+    residual: Real, measured: Real, variables: Mapping[str, Variable], *, beyond_motion: bool = False
 ) -> tuple[RegimeShare, ...]:
     """Find the regimes of motion in which the gap is larger than elsewhere.
 
@@ -133,7 +130,7 @@ def regime_shares(
     residual, measured
         ``[output, sample]``.
     variables
-        Name, such as ``elbow.velocity``, to ``[sample]``, SI.
+        By name, such as ``elbow.velocity``.
     beyond_motion
         Whether a regime must hold 1.5 times as much, too, as it would of a gap that is the same share of each output
         at any time. Such a gap grows with the motion, so that large amplitudes would always be told.
@@ -149,13 +146,13 @@ def regime_shares(
         return ()
     expected = _power_of_motion(residual, measured) if beyond_motion else np.zeros_like(power)
     found = []
-    for name, values in variables.items():
-        if values.shape != power.shape:
-            raise EstimateError(f"variable {name!r} has {values.size} samples, the residual {power.size}")
-        found += _apart([_regime(name, values, power, expected, edges) for edges in _regimes(values)])
+    for name, one in variables.items():
+        if one.values.shape != power.shape:
+            raise EstimateError(f"variable {name!r} has {one.values.size} samples, the residual {power.size}")
+        tried = [_regime(name, one, power, expected, edges) for edges in _regimes(one.values)]
+        found += _apart([regime for regime in tried if regime is not None])
     # Each variable has its say first; the strongest of all are told.
-    found.sort(key=lambda regime: -regime.excess)
-    return tuple(regime.told for regime in found[:LISTED])
+    return tuple(sorted(found, key=_excess, reverse=True)[:LISTED])
 
 
 def gap_map(residual: Real, measured: Real, sample_rate_hz: float) -> tuple[Real, Real, Real]:
@@ -209,14 +206,7 @@ def _noise_shares(
     return [min(float(ours / whole), 1.0) if whole > 0 else None for ours, whole in zip(inside, power, strict=True)]
 
 
-def _mode_edges_hz(modes_hz: Sequence[float], frequency_hz: Real) -> Real:
-    modes = np.sort(np.asarray(modes_hz, dtype=np.float64))
-    inner = np.sqrt(modes[:-1] * modes[1:])
-    top_hz, apart_hz = float(frequency_hz[-1]), LINES_APART * float(frequency_hz[1])
-    return _spaced([*inner, *(2 * modes[-1:])], top_hz, apart_hz)
-
-
-def _log_edges_hz(gap: Real, whole: Real, frequency_hz: Real) -> Real:
+def _edges_hz(gap: Real, whole: Real, frequency_hz: Real) -> Real:
     power = sum((one[1:] / one[1:].sum() for one in (gap, whole) if one[1:].sum() > 0), np.zeros(gap.size - 1))
     if not power.any():
         return np.array([0.0, frequency_hz[-1]])
@@ -225,14 +215,9 @@ def _log_edges_hz(gap: Real, whole: Real, frequency_hz: Real) -> Real:
     first, last = (min(int(np.searchsorted(rising, at)), power.size - 1) for at in (SLIGHT, 1 - SLIGHT))
     low_hz, high_hz = float(frequency_hz[1 + first]), float(frequency_hz[1 + last])
     top_hz, apart_hz = float(frequency_hz[-1]), LINES_APART * float(frequency_hz[1])
-    return _spaced(np.geomspace(max(low_hz, apart_hz), max(high_hz, 2 * apart_hz), BANDS + 1), top_hz, apart_hz)
-
-
-def _spaced(inner_hz: Sequence[float] | Real, top_hz: float, apart_hz: float) -> Real:
-    """Put edges between 0 and the top, without those that would leave a band of less than some lines."""
+    # Bands of less than some lines are one with their neighbour.
     edges = [0.0]
-    # Modes closer than some lines share a band.
-    for edge in inner_hz:
+    for edge in np.geomspace(max(low_hz, apart_hz), max(high_hz, 2 * apart_hz), BANDS + 1):
         if edges[-1] + apart_hz <= edge <= top_hz - apart_hz:
             edges.append(float(edge))
     return np.array([*edges, top_hz])
@@ -255,29 +240,33 @@ def _power_of_motion(residual: Real, measured: Real) -> Real:
     return np.asarray(power / power.sum() if power.sum() > 0 else power)
 
 
-def _regime(name: str, values: Real, power: Real, expected: Real, edges: tuple[float, float]) -> _Regime:
-    """Weigh one regime; `power` of the gap, and the one that it must exceed too."""
+def _regime(
+    name: str, variable: Variable, power: Real, expected: Real, edges: tuple[float, float]
+) -> RegimeShare | None:
+    """Weigh one regime; `power` of the gap, and the one that it must exceed too; None where it doesn't count."""
     low, high = edges
-    inside = (values >= low) & (values <= high)
+    inside = (variable.values >= low) & (variable.values <= high)
     share, time = float(power[inside].sum() / power.sum()), float(inside.mean())
-    excess = share - time
     # Over stretches of the record, since neighbouring samples tell the same; from one stretch to the next, since an
     # amplitude that rises and falls over the record isn't what scatters.
     parts = np.array_split(power * (inside - time), PIECES)
     sums = np.array([part.sum() for part in parts]) / power.sum()
     error = float(np.sqrt(PIECES * np.mean(np.diff(sums) ** 2) / 2))
-    told = RegimeShare(variable=name, low=low, high=high, share=share, time=time)
     least = max(SAME * time, CLEARLY * float(expected[inside].sum()))
-    counts = share >= least and excess > OUTSIDE * error
-    return _Regime(told=told, excess=excess if counts else 0.0, inside=edges)
+    if not (share >= least and share - time > OUTSIDE * error):
+        return None
+    return RegimeShare(variable=name, low=low, high=high, share=share, time=time, unit=variable.unit)
 
 
-def _apart(regimes: list[_Regime]) -> list[_Regime]:
-    """Give those that count, the strongest of any that overlap."""
-    kept: list[_Regime] = []
-    for regime in sorted(regimes, key=lambda one: -one.excess):
-        low, high = regime.inside
-        overlaps = any(low < other.inside[1] and other.inside[0] < high for other in kept)
-        if regime.excess > 0 and not overlaps:
+def _excess(regime: RegimeShare) -> float:
+    """By how much its share of the gap exceeds its share of time."""
+    return regime.share - (regime.time or 0.0)
+
+
+def _apart(regimes: list[RegimeShare]) -> list[RegimeShare]:
+    """Give the strongest of any that overlap."""
+    kept: list[RegimeShare] = []
+    for regime in sorted(regimes, key=_excess, reverse=True):
+        if not any(regime.low < other.high and other.low < regime.high for other in kept):
             kept.append(regime)
     return kept

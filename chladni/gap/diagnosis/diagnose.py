@@ -1,6 +1,6 @@
 """The whole diagnosis of a model and its logs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -8,12 +8,12 @@ from chladni.gap.calibration import COVERAGE
 from chladni.gap.comparison.distortion import distortion_where_told
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.periodicity import with_period
-from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, regime_shares
+from chladni.gap.comparison.shares import Variable, band_shares, channel_gaps, gap_map, regime_shares
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.diagnosis.advice import advice_on, measure_next
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.evidence import any_law, evidence
-from chladni.gap.diagnosis.joint_motions import JointMotions, joint_motions
+from chladni.gap.diagnosis.joint_motions import joint_motions
 from chladni.gap.diagnosis.naming import (
     causes_named,
     correlation_of,
@@ -33,7 +33,6 @@ from chladni.gap.records.diagnosis import (
     Diagnosis,
     GapSignals,
     PairShare,
-    RegimeShare,
     RestoringForce,
     SiteShare,
     Where,
@@ -134,7 +133,7 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
         advice=advice_on(study, causes),
         restoring_forces=tuple(_restoring(study, causes, one) for one in recoveries),
         signals=_signals(study, causes, before, after),
-        distortion=() if distortion is None else distortion.told,
+        distortion=() if distortion is None else distortion.shares,
         answer_set=() if causes.shaken is not None else causes.belief.answer_set(COVERAGE),
         coverage=COVERAGE,
     )
@@ -162,7 +161,7 @@ def _nominal(study: Study) -> Real:
         return run.outputs()
 
 
-def _where(study: Study, causes: Causes, simulated: Real, motions: JointMotions) -> Where:
+def _where(study: Study, causes: Causes, simulated: Real, motions: Mapping[str, Variable]) -> Where:
     measurement = study.measurement
     residual = measurement.outputs - simulated
     return Where(
@@ -171,7 +170,7 @@ def _where(study: Study, causes: Causes, simulated: Real, motions: JointMotions)
             residual, measurement.outputs, sample_rate_hz=measurement.sample_rate_hz, noise=causes.noise
         ),
         sites=_sites(study.location),
-        regimes=_regimes(residual, measurement.outputs, motions),
+        regimes=regime_shares(residual, measurement.outputs, motions, beyond_motion=True),
         times=time_shares(residual, measurement.outputs, sample_rate_hz=measurement.sample_rate_hz),
         pair=_pair(study.location, causes.forces),
     )
@@ -191,11 +190,6 @@ def _pair(location: Location, forces: Located | None) -> PairShare | None:
         return None
     first, second = forces.places
     return PairShare(groups=(first.names, second.names), share=explained_share(location.tuned, forces.profile))
-
-
-def _regimes(residual: Real, measured: Real, motions: JointMotions) -> tuple[RegimeShare, ...]:
-    found = regime_shares(residual, measured, motions.signals, beyond_motion=True)
-    return tuple(replace(one, unit=motions.units[one.variable]) for one in found)
 
 
 def _restoring(study: Study, causes: Causes, motion: Recovered) -> RestoringForce:

@@ -1,9 +1,7 @@
 """How each joint of a model moves while a log's inputs drive it: what the regimes of a gap are cut by."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 from chladni.gap.comparison.log_regimes import amplitude
+from chladni.gap.comparison.shares import Variable
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.location.locate import lowest_hz
 from chladni.gap.location.recovered import Recovered
@@ -12,27 +10,11 @@ from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JointMotions:
-    """Motion of joints over a whole log.
-
-    Attributes
-    ----------
-    signals
-        Name, such as ``elbow.velocity``, to ``[sample]``, SI.
-    units
-        By the same names.
-    """
-
-    signals: Mapping[str, Real]
-    units: Mapping[str, str]
-
-
-def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) -> JointMotions:
-    """Give displacement, velocity and amplitude of every joint; nothing of those whose motion can't be told.
+def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) -> dict[str, Variable]:
+    """Give displacement, velocity and amplitude of every joint, by names such as ``elbow.velocity``.
 
     They're those of a fitted model's run, but at the site whose motion was recovered: the sensors tell that without
-    any law. A run that diverges tells nothing.
+    any law. A run that diverges tells nothing, and a joint whose motion can't be told is left out.
 
     Parameters
     ----------
@@ -45,21 +27,16 @@ def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) ->
     if known is not None and known.site.kind == "joint":
         moved[known.site.name] = known.displacement, known.velocity
     period = round(study.measurement.sample_rate_hz / lowest_hz(study.model, study.measurement))
-    signals: dict[str, Real] = {}
-    units: dict[str, str] = {}
+    found: dict[str, Variable] = {}
     for port in study.contest.run.compiled().ports:
         if port.kind != "joint" or port.name not in moved:
             continue
         displacement, velocity = moved[port.name]
         unit = port.displacement_unit
-        for word, signal, its_unit in (
-            ("displacement", displacement, unit),
-            ("velocity", velocity, f"{unit}/s"),
-            ("amplitude", amplitude(displacement, period), unit),
-        ):
-            signals[f"{port.name}.{word}"] = signal
-            units[f"{port.name}.{word}"] = its_unit
-    return JointMotions(signals=signals, units=units)
+        found[f"{port.name}.displacement"] = Variable(displacement, unit)
+        found[f"{port.name}.velocity"] = Variable(velocity, f"{unit}/s")
+        found[f"{port.name}.amplitude"] = Variable(amplitude(displacement, period), unit)
+    return found
 
 
 def _of_run(study: Study, fit: OutputErrorFit) -> dict[str, tuple[Real, Real]]:

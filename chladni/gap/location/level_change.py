@@ -7,14 +7,14 @@ import numpy as np
 from scipy import fft
 
 from chladni.gap.calibration import ALIKE
-from chladni.gap.comparison.linear_approximation import moving_inputs, period_spectra
+from chladni.gap.comparison.levels import level_of
+from chladni.gap.comparison.linear_approximation import excited_alone, moving_inputs, period_spectra
 from chladni.gap.comparison.outside_band import even_functions, odd_functions
-from chladni.gap.comparison.periodicity import periods_of
+from chladni.gap.comparison.periodicity import steady_periods
 from chladni.gap.records.measurement import Measurement
-from chladni.signals.arrays import Complex, Index, Mask, Real
+from chladni.signals.arrays import Complex, Index, Real
 from chladni.signals.errors import EstimateError
 from chladni.signals.value import Value
-from chladni.spectral.excitation import DYNAMIC_RANGE, excited_lines
 from chladni.spectral.forms import MOTION_ORDER
 
 
@@ -127,14 +127,14 @@ def level_change(measurements: Sequence[Measurement]) -> LevelChange:
     if len(names) != 1:
         raise EstimateError(f"one input must move at all levels, not {', '.join(sorted(names)) or 'none'}")
     (name,) = names
-    ordered = sorted(measurements, key=lambda one: _level(one, name))
-    level = np.array([_level(one, name) for one in ordered])
+    ordered = sorted(measurements, key=lambda one: level_of(one, name))
+    level = np.array([level_of(one, name) for one in ordered])
     if len(ordered) < 2 or level[-1] < ALIKE * level[0]:
         raise EstimateError(
             f"{name} has {', '.join(f'{one:.3g}' for one in level)} RMS: a change with level needs logs whose "
             f"levels differ by {ALIKE - 1:.0%} or more"
         )
-    lines = np.flatnonzero(np.all([_excited(one, name) for one in ordered], axis=0))
+    lines = np.flatnonzero(np.all([one[1] for one in map(excited_alone, ordered) if one is not None], axis=0))
     found = [_responses(one, name, lines) for one in ordered]
     first = ordered[0]
     return LevelChange(
@@ -180,24 +180,10 @@ def _require_alike(one: Measurement, first: Measurement) -> None:
             )
 
 
-def _level(one: Measurement, name: str) -> float:
-    return float(np.std(one.inputs[one.input_names.index(name)]))
-
-
-def _excited(one: Measurement, name: str) -> Mask:
-    spectra = period_spectra(one)
-    if spectra is None:
-        return np.zeros(0, dtype=np.bool_)
-    row = spectra.index(name)
-    power = spectra.density[row, row].real
-    return np.asarray(excited_lines(spectra, [name])[0] & (power > DYNAMIC_RANGE * power.max()))
-
-
 def _responses(one: Measurement, name: str, lines: Index) -> tuple[Complex, Real, Complex]:
     """Response and its variance ``[output, line]``, and the input's spectrum ``[line]``."""
     signals = np.concatenate([one.inputs[[one.input_names.index(name)]], one.outputs])
-    periods = periods_of(signals, int(one.period_samples or 1))[:, one.transient_periods :]
-    spectra = fft.rfft(periods, axis=2)[:, :, lines]
+    spectra = fft.rfft(steady_periods(signals, one), axis=2)[:, :, lines]
     mean = spectra.mean(axis=1)
     response = mean[1:] / mean[0]
     # Scatter of the force is in the residual about the response too, as it should be.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from chladni.gap.calibration import CLOSE, COVERAGE, LAPSE, LEAST_SHARE, NAMED, SIGMAS, TEMPER
-from chladni.gap.comparison.shares import band_shares, regime_shares, relative_residual
+from chladni.gap.comparison.shares import Variable, band_shares, regime_shares, relative_residual
 from chladni.gap.comparison.time_shares import time_shares
 from chladni.gap.records.diagnosis import (
     PARAMETER,
@@ -395,8 +395,10 @@ def _where(solved: Solved, fit: Fit) -> Where:
     shares = power / power.sum() if power.sum() > 0 else power
     rate = torques.rate_hz
     names = [joint.name for _, joint in torques.rows]
-    regimes = {f"{joint.name}.velocity": torques.velocity[row] for row, joint in torques.rows}
-    units = {f"{joint.name}.velocity": "rad/s" if joint.kind == "hinge" else "m/s" for _, joint in torques.rows}
+    speeds = {
+        f"{joint.name}.velocity": Variable(torques.velocity[row], "rad/s" if joint.kind == "hinge" else "m/s")
+        for row, joint in torques.rows
+    }
     return Where(
         channels=tuple(
             ChannelGap(name=name, gap=float(np.sqrt(np.mean(row**2)) / size), noise=float(noise / size),
@@ -408,7 +410,7 @@ def _where(solved: Solved, fit: Fit) -> Where:
             SiteShare(name=name, share=float(share))
             for share, name in sorted(zip(shares, names, strict=True), key=lambda one: -one[0])
         ),
-        regimes=tuple(replace(one, unit=units[one.variable]) for one in regime_shares(residual, drive, regimes)),
+        regimes=regime_shares(residual, drive, speeds),
         times=tuple(
             replace(one, start_s=float(at_s[0]), end_s=float(at_s[1]))
             for one in time_shares(residual, drive, sample_rate_hz=rate)

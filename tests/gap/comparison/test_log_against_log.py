@@ -3,8 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.comparison.log_against_log import compare_logs, view_gap
-from chladni.gap.comparison.noise_estimate import estimate_noise
+from chladni.gap.comparison.log_against_log import compare_logs
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.errors import LogError
 from tests.gap.comparison import made_measurements as made
@@ -43,16 +42,6 @@ def test_where_the_simulation_is_wrong_is_told() -> None:
     assert found.remarks == ()
 
 
-def test_a_floor_bands_and_variables_can_be_given() -> None:
-    measured, simulated = pair()
-    floor = estimate_noise(measured)
-    loud = np.abs(simulated.outputs[0])
-    found = view_gap(measured, simulated.outputs, noise=floor, modes_hz=(10.5, 27.0, 46.5), variables={"size": loud})
-    assert found.noise is floor
-    assert [band.share for band in found.where.bands][1] > 0.8
-    assert {regime.variable for regime in found.where.regimes} <= {"size"}
-
-
 def test_outputs_are_matched_by_name_and_lone_ones_told() -> None:
     measured, simulated = pair()
     swapped = replace(simulated, outputs=simulated.outputs[::-1], output_names=("acc2", "other"))
@@ -66,7 +55,7 @@ def test_outputs_are_matched_by_name_and_lone_ones_told() -> None:
 def test_the_longer_log_is_cut_and_told() -> None:
     measured, simulated = pair()
     short = replace(simulated, inputs=simulated.inputs[:, :5000], outputs=simulated.outputs[:, :5000])
-    found = compare_logs(measured, short, variables={"v": measured.outputs[0]})
+    found = compare_logs(measured, short)
     assert found.residual.shape == (2, 5000)
     assert any("made.mcap is cut to the 10 s" in remark for remark in found.remarks)
 

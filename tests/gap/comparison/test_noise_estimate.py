@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, welch
 
-from chladni.gap.comparison.noise_estimate import estimate_noise, noise_of_residual, smaller_floor
+from chladni.gap.comparison.noise_estimate import estimate_noise, smaller_floor
 from chladni.gap.comparison.periodicity import with_period
 from chladni.gap.records.measurement import Measurement
-from chladni.signals.errors import EstimateError
 from tests.gap.comparison import made_measurements as made
+from tests.gap.made_log import white_floor
 
 SAMPLES = 12000
 COLOURS = ["white", "pink", "resonant"]
@@ -200,43 +200,11 @@ def test_a_noise_free_measurement_has_a_tiny_floor() -> None:
     assert np.all(floor.innovation_rms > 0)
 
 
-@pytest.mark.parametrize("colour", COLOURS)
-def test_noise_of_a_residual(colour: str) -> None:
-    residual = 0.2 * made.coloured(np.random.default_rng(11), (2, SAMPLES), colour)
-    floor = noise_of_residual(residual, sample_rate_hz=500.0)
-    np.testing.assert_allclose(floor.rms, np.sqrt(np.mean(residual**2, axis=1)), rtol=1e-3)
-    white = floor.whitened(residual)[:, 100:]
-    # Segments of 512 can't tell the lowest decade of pink noise apart; white and resonant noise they can.
-    np.testing.assert_allclose(white.std(axis=1), 1.0, rtol=0.05)
-    assert floor.method == ("explained residual", "explained residual")
-    assert floor.upper_bound.all()
-
-
-def test_noise_of_a_short_residual_and_of_none() -> None:
-    rng = np.random.default_rng(12)
-    assert noise_of_residual(rng.standard_normal((1, 60)), sample_rate_hz=1.0).rms[0] == pytest.approx(1, abs=0.5)
-    silent = noise_of_residual(np.zeros((1, 500)), sample_rate_hz=1.0, method="fit residual")
-    assert np.all(np.isfinite(silent.whitened(np.ones((1, 5)))))
-    assert silent.method == ("fit residual",)
-    with pytest.raises(EstimateError, match="sample_rate_hz"):
-        noise_of_residual(np.zeros((1, 500)), sample_rate_hz=0.0)
-
-
-def test_the_std_of_a_residuals_rms_is_its_scatter() -> None:
-    rng = np.random.default_rng(13)
-    for colour in ("white", "resonant"):
-        runs = made.coloured(rng, (1, 200 * 2000), colour).reshape(200, 2000)
-        floor = noise_of_residual(runs, sample_rate_hz=1.0)
-        # 200 runs give the scatter to 5 %; the spectrum's resolution a little more.
-        assert np.median(floor.std) == pytest.approx(floor.rms.std() / floor.rms.mean(), rel=0.3)
-
-
 def test_the_smaller_floor_is_taken_output_by_output() -> None:
-    rng = np.random.default_rng(14)
-    white = rng.standard_normal((2, 5000))
-    tinted = lfilter([1.0], [1.0, -0.9], white)
-    first = noise_of_residual(np.array([white[0], tinted[1]]), sample_rate_hz=1.0, method="a")
-    second = noise_of_residual(np.array([tinted[0], white[1]]), sample_rate_hz=1.0, method="b")
+    white = np.random.default_rng(14).standard_normal((2, 5000))
+    first = replace(white_floor(np.array([1.0, 2.3])), method=("a", "a"))
+    tinted = np.array([[1.0, -0.9], [1.0, 0.0]])
+    second = replace(white_floor(np.array([2.3, 1.0])), whitening=tinted, method=("b", "b"))
     both = smaller_floor(first, second)
     assert both.method == ("a", "b")
     np.testing.assert_array_equal(both.rms, [first.rms[0], second.rms[1]])

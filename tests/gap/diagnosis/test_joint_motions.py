@@ -67,15 +67,16 @@ def test_a_mass_on_a_spring_moves_as_the_formula_says() -> None:
     time_s = np.arange(4000) / RATE_HZ
     model = slide()
     found = joint_motions(study(model, FORCE_N * np.sin(2 * np.pi * FREQUENCY_HZ * time_s)), fit(model), None)
-    assert found.units == {"guide.displacement": "m", "guide.velocity": "m/s", "guide.amplitude": "m"}
+    units = {name: one.unit for name, one in found.items()}
+    assert units == {"guide.displacement": "m", "guide.velocity": "m/s", "guide.amplitude": "m"}
     omega = 2 * np.pi * FREQUENCY_HZ
     size = FORCE_N / abs(STIFFNESS - MASS * omega**2 + 1j * omega * DAMPING)
     # The first second forgets how it began: e^-11.
     late = slice(1000, None)
-    assert np.max(found.signals["guide.displacement"][late]) == pytest.approx(size, rel=1e-2)
-    assert np.max(found.signals["guide.velocity"][late]) == pytest.approx(omega * size, rel=1e-2)
+    assert np.max(found["guide.displacement"].values[late]) == pytest.approx(size, rel=1e-2)
+    assert np.max(found["guide.velocity"].values[late]) == pytest.approx(omega * size, rel=1e-2)
     # Over a period of the mode, 0.76 of the sine's, it goes up and down about the sine's own.
-    assert np.mean(found.signals["guide.amplitude"][late]) == pytest.approx(size, rel=0.1)
+    assert np.mean(found["guide.amplitude"].values[late]) == pytest.approx(size, rel=0.1)
 
 
 def test_every_joint_is_there_and_the_recovered_motion_is_kept() -> None:
@@ -84,11 +85,11 @@ def test_every_joint_is_there_and_the_recovered_motion_is_kept() -> None:
     seen = np.sin(np.arange(beside.measurement.samples) / 30)
     known: Any = SimpleNamespace(site=Site(name="elbow", kind="joint"), displacement=seen, velocity=np.gradient(seen))
     found = joint_motions(beside, fit(model), known)
-    assert {name.split(".")[0] for name in found.signals} == {"shoulder", "elbow", "hand"}
-    assert found.signals["elbow.displacement"] is seen
-    assert not np.array_equal(joint_motions(beside, fit(model), None).signals["elbow.displacement"], seen)
+    assert {name.split(".")[0] for name in found} == {"shoulder", "elbow", "hand"}
+    assert found["elbow.displacement"].values is seen
+    assert not np.array_equal(joint_motions(beside, fit(model), None)["elbow.displacement"].values, seen)
     at_input: Any = SimpleNamespace(site=Site(name="shaker", kind="input"), displacement=seen, velocity=seen)
-    assert len(joint_motions(beside, fit(model), at_input).signals) == 9
+    assert len(joint_motions(beside, fit(model), at_input)) == 9
 
 
 def test_a_run_that_diverges_leaves_what_was_recovered() -> None:
@@ -101,8 +102,8 @@ def test_a_run_that_diverges_leaves_what_was_recovered() -> None:
     beside.contest.run = SimpleNamespace(compiled=beside.contest.run.compiled, motions=diverging)
     seen = np.sin(np.arange(beside.measurement.samples) / 30)
     known: Any = SimpleNamespace(site=Site(name="hand", kind="joint"), displacement=seen, velocity=seen)
-    assert joint_motions(beside, fit(model), None).signals == {}
-    assert set(joint_motions(beside, fit(model), known).signals) == {
+    assert joint_motions(beside, fit(model), None) == {}
+    assert set(joint_motions(beside, fit(model), known)) == {
         "hand.displacement", "hand.velocity", "hand.amplitude"
     }  # fmt: skip
 
@@ -119,8 +120,8 @@ def test_a_gap_that_a_joint_s_motion_makes_is_told_by_that_joint() -> None:
     beside: Any = SimpleNamespace(model=model, measurement=log, contest=SimpleNamespace(run=run))
     motions = joint_motions(beside, fit(model), None)
     residual = log.outputs - run.outputs()
-    (first, *_) = regime_shares(residual, log.outputs, motions.signals, beyond_motion=True)
+    (first, *_) = regime_shares(residual, log.outputs, motions, beyond_motion=True)
     assert first.variable == "hand.amplitude"
-    assert first.high == motions.signals["hand.amplitude"].max()
+    assert first.high == motions["hand.amplitude"].values.max()
     assert first.time is not None
     assert first.share > 2 * first.time
