@@ -1,6 +1,6 @@
 """Counts, bounds, values and near words in sentences."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from difflib import get_close_matches
 from itertools import islice
 from math import floor, isfinite, log10
@@ -27,6 +27,17 @@ def counted(number: int, noun: str) -> str:
     ('1 sample', '0 gaps', '3 messages')
     """
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Give words as a list in a sentence.
+
+    Examples
+    --------
+    >>> listed(["wrist"]), listed(["base", "elbow", "wrist"])
+    ('wrist', 'base, elbow and wrist')
+    """
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def rounded_up(bound: float, *, digits: int = 3) -> str:

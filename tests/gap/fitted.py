@@ -43,7 +43,6 @@ def contestant(
         fit=SimpleNamespace(effects=effects, effect_std=tuple({} for _ in effects)),
         held=np.full(outputs, chi),
         gap=gap,
-        prior=0.0,
         left=leaving(1.0 + 100.0 / (1.0 + count)) if left is None else left,
         log_evidence=log_evidence,
     )

@@ -1,7 +1,7 @@
 """Sensors that a structure could have besides those in a log."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,15 +21,14 @@ _WORDS: dict[Measure, str] = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MoreSensor:
-    """A sensor that isn't there yet; `words` say which, as in "add an accelerometer at wrist"."""
-
-    output: StructureOutput
-    words: str
+def sensor_words(sensor: StructureOutput) -> str:
+    """Say which sensor it is, as in "add an accelerometer at wrist"."""
+    return f"{_WORDS[sensor.measures]} {sensor.at}"
 
 
-def more_sensors(model: Model, measurement: Measurement, suspects: Collection[str] = ()) -> tuple[MoreSensor, ...]:
+def more_sensors(
+    model: Model, measurement: Measurement, suspects: Collection[str] = ()
+) -> tuple[StructureOutput, ...]:
     """Give accelerometers at bodies without one, encoders and force sensors at suspected joints.
 
     Parameters
@@ -53,16 +52,26 @@ def more_sensors(model: Model, measurement: Measurement, suspects: Collection[st
     found = []
     for at, measures in wanted:
         if (at, measures) not in have:
-            output = StructureOutput(name=_free(f"{measures}_of_{at}"[:90], taken), measures=measures, at=at)
-            found.append(MoreSensor(output=output, words=f"{_WORDS[measures]} {at}"))
+            found.append(StructureOutput(name=_free(f"{measures}_of_{at}"[:90], taken), measures=measures, at=at))
     return tuple(found)
 
 
-def with_sensors(model: Model, sensors: Sequence[MoreSensor]) -> Model:
+def with_sensors(model: Model, sensors: Sequence[StructureOutput]) -> Model:
     """Give the model with the sensors behind its own."""
     if not sensors or not isinstance(model, StructureModel):
         return model
-    return replace(model, outputs=(*model.outputs, *(one.output for one in sensors)))
+    return replace(model, outputs=(*model.outputs, *sensors))
+
+
+def with_rows(measurement: Measurement, model: Model, sensors: Sequence[StructureOutput]) -> Measurement:
+    """Give the record that would be made with the sensors of a model too; what they would show is not known."""
+    units = {one.name: one.unit for one in model.compile().outputs}
+    return replace(
+        measurement,
+        outputs=np.concatenate([measurement.outputs, np.zeros((len(sensors), measurement.samples))]),
+        output_names=(*measurement.output_names, *(one.name for one in sensors)),
+        output_units=(*measurement.output_units, *(units[one.name] for one in sensors)),
+    )
 
 
 def with_noise_of(noise: NoiseFloor, units: Sequence[str], more_units: Sequence[str], signals: Real) -> NoiseFloor:

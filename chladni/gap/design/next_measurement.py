@@ -12,6 +12,7 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.models.effects.catalogue import spoken_effect
 from chladni.signals.errors import EstimateError, ModelError
+from chladni.signals.wording import listed
 
 
 def next_measurement(
@@ -118,11 +119,11 @@ def _apart(candidates: Sequence[Contestant]) -> str:
     if len(candidates[0].hypothesis.named) > 1:
         # Beside several causes one of them needs a word, or it reads as the first half of the others.
         words = [what if not site else f"{what} at {site} alone" for what, site in named]
-        return _listed(words)
+        return listed(words)
     sites = {site for _, site in named}
     if len(sites) == 1 and "" not in sites:
-        return f"{_listed([what for what, _ in named])} at {sites.pop()}"
-    return _listed([f"{what} at {site}" if site else what for what, site in named])
+        return f"{listed([what for what, _ in named])} at {sites.pop()}"
+    return listed([f"{what} at {site}" if site else what for what, site in named])
 
 
 def _spoken(candidate: Contestant) -> tuple[str, str]:
@@ -140,10 +141,6 @@ def _whole(one: Candidate) -> str:
     if one.effect == PARAMETER:
         return f"another value of {one.site}"
     return f"{spoken_effect(one.effect)} at {one.site}"
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def _lowered(words: str) -> str:

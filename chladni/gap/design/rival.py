@@ -8,7 +8,7 @@ import numpy as np
 from chladni.gap.calibration import LONGEST, PROFILE_STEPS, ROUNDING, STEP
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
-from chladni.gap.plant.law_plant import Setting, fine_run, slopes_of
+from chladni.gap.plant.law_plant import Setting, around, differences, fine_run, slopes_of
 from chladni.gap.plant.linear_run import can_run, decay
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.noise_floor import NoiseFloor
@@ -29,14 +29,11 @@ class Prediction:
         ``[unknown, output, sample]`` by its parameters and those of its effects.
     starts
         ``[state, output, sample]`` by the initial state of each window.
-    at
-        ``[unknown]`` where.
     """
 
     outputs: Real
     own: Real
     starts: Real
-    at: Real
 
 
 class Rival:
@@ -93,25 +90,17 @@ class Rival:
             When it diverges there.
         """
         x = np.zeros(self.unknowns) if at is None else at
-        here = self._setting(x)
+        here, changed = self._setting(x), around(self._setting, x, self._steps(x))
         compiled = run.compiled(here.z, here.effects)
         if can_run(compiled):
             made = fine_run(run, here, initial)
-            steps = self._steps(x)
-            changed = [(self._setting(x + row), by) for row, by in zip(np.diag(steps), steps, strict=True)]
-            own, starts = slopes_of(run, made, changed)
-            return Prediction(made.outputs, own, starts, x)
+            return Prediction(made.outputs, *slopes_of(run, made, changed))
         outputs = run.outputs(here.z, here.effects, initial)
-        own = np.empty((x.size, *outputs.shape))
-        for place, by in enumerate(self._steps(x)):
-            moved = x.copy()
-            moved[place] += by
-            there = self._setting(moved)
-            own[place] = (run.outputs(there.z, there.effects, initial) - outputs) / by
+        own = differences(run, changed, initial, outputs)
         rate = run.measurement.sample_rate_hz
         longest = decay(compiled, run.rows, rate, max(stop - start for start, stop in run.windows))
         starts = np.concatenate([longest[..., : stop - start] for start, stop in run.windows], axis=-1)
-        return Prediction(outputs, own, starts, x)
+        return Prediction(outputs, own, starts)
 
     def _setting(self, x: Real) -> Setting:
         count = self._z.size

@@ -7,12 +7,11 @@ from itertools import pairwise
 import numpy as np
 
 from chladni.gap.calibration import LINES, LITTLE, PLACES, PROFILE_STEPS, ZERO
-from chladni.gap.design.course import Course
+from chladni.gap.design.course import Course, Record, Separation
 from chladni.gap.design.experiment import Change, Design, Experiment
 from chladni.gap.design.experiments import Reach
-from chladni.gap.design.more_sensors import MoreSensor, more_sensors, with_noise_of, with_sensors
+from chladni.gap.design.more_sensors import more_sensors, sensor_words, with_noise_of, with_rows, with_sensors
 from chladni.gap.design.rival import Rival
-from chladni.gap.design.separation import Record, Separation
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import Windows
 from chladni.gap.plant.tunable import Tunables
@@ -72,7 +71,7 @@ class Search:
         self._reach = Reach(
             model=with_sensors(model, self._sensors), measurement=stretch, begins_with_log=begin == 0, seed=seed
         )
-        self._record = _with_rows(stretch, self._reach.model, self._sensors)
+        self._record = with_rows(stretch, self._reach.model, self._sensors)
         self._logged = Course(self._reach.as_logged(), self._rivals, self._record, self._windows)
         all_noise = with_noise_of(
             noise, measurement.output_units, self._record.output_units[len(self._own) :], self._logged.outputs
@@ -111,7 +110,7 @@ class Search:
     def _with_sensors(self) -> list[_Found]:
         return [
             self._found(
-                replace(self._logged.experiment, change="sensor", words=f"Add {sensor.words}"),
+                replace(self._logged.experiment, change="sensor", words=f"Add {sensor_words(sensor)}"),
                 self._logged,
                 (*self._own, len(self._own) + place),
             )
@@ -200,15 +199,3 @@ def _windows(fitted: Contestant, samples: int) -> list[tuple[int, int]]:
 def _part(measurement: Measurement, start: int, stop: int) -> Measurement:
     inputs, outputs = measurement.inputs[:, start:stop], measurement.outputs[:, start:stop]
     return replace(measurement, inputs=inputs, outputs=outputs, period_samples=None, transient_periods=0)
-
-
-def _with_rows(measurement: Measurement, model: Model, sensors: Sequence[MoreSensor]) -> Measurement:
-    """Give the record that would be made with the sensors too; what they would show is not known."""
-    units = {one.name: one.unit for one in model.compile().outputs}
-    names = tuple(one.output.name for one in sensors)
-    return replace(
-        measurement,
-        outputs=np.concatenate([measurement.outputs, np.zeros((len(names), measurement.samples))]),
-        output_names=(*measurement.output_names, *names),
-        output_units=(*measurement.output_units, *(units[name] for name in names)),
-    )

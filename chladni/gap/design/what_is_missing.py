@@ -1,14 +1,20 @@
 """What a log lacks for any answer: length, level, or the sensor that would tell where a force acts."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from chladni.gap.calibration import CYCLES_ASKED, LINES, LITTLE, LOCATED, LOUD, NEAR_DEG, ZERO
 from chladni.gap.comparison.doubts import modes_of
 from chladni.gap.design.experiments import excited_band_hz
-from chladni.gap.design.more_sensors import MoreSensor, angles_deg, more_sensors, with_noise_of, with_sensors
+from chladni.gap.design.more_sensors import (
+    angles_deg,
+    more_sensors,
+    sensor_words,
+    with_noise_of,
+    with_rows,
+    with_sensors,
+)
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_view import LinearView
 from chladni.gap.plant.places import Site, placed, printed_patterns, sites_of
@@ -16,8 +22,12 @@ from chladni.gap.plant.record_lines import RecordLines
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
+from chladni.models.structures.structure_output import StructureOutput
 from chladni.signals.arrays import Complex, Real
 from chladni.signals.errors import ModelError
+from chladni.signals.wording import listed
+
+_Sensors = Sequence[StructureOutput]
 
 
 def what_is_missing(
@@ -96,7 +106,11 @@ def sensor_missing(
 
 
 def _best_sensor(
-    model: Model, measurement: Measurement, noise: NoiseFloor, sensors: Sequence[MoreSensor], names: Sequence[str]
+    model: Model,
+    measurement: Measurement,
+    noise: NoiseFloor,
+    sensors: Sequence[StructureOutput],
+    names: Sequence[str],
 ) -> str | None:
     patterns, sites = _patterns(model, measurement, noise, sensors, names)
     if len(sites) < 2:
@@ -110,28 +124,36 @@ def _best_sensor(
     then = gained[best][0]
     if then < 2.0 * now or then < 1.0:
         return None
-    places = _listed([site.name for site in sites])
+    places = listed([site.name for site in sites])
     reason = (
         "One sensor can't tell where a force acts" if len(own) == 1 else f"The sensors hardly tell {places} apart"
     )
     by = "" if len(sites) == 2 else "at least "
     return (
-        f"{reason}: add {sensors[best].words}. What forces at {places} print over the sensors then differs by "
-        f"{by}{then:.2g} degrees, now by {round(now, 1):g}; 90 can't be confused, less than {NEAR_DEG:g} drowns in "
-        "noise."
+        f"{reason}: add {sensor_words(sensors[best])}. What forces at {places} print over the sensors then differs "
+        f"by {by}{then:.2g} degrees, now by {round(now, 1):g}; 90 can't be confused, less than {NEAR_DEG:g} drowns "
+        "in noise."
     )
 
 
 def _patterns(
-    model: Model, measurement: Measurement, noise: NoiseFloor, sensors: Sequence[MoreSensor], names: Sequence[str]
+    model: Model,
+    measurement: Measurement,
+    noise: NoiseFloor,
+    sensors: Sequence[StructureOutput],
+    names: Sequence[str],
 ) -> tuple[Complex, list[Site]]:
     """Patterns of the likeliest sites over the log's sensors and those that may be added."""
     more = with_sensors(model, sensors)
     compiled = more.compile()
-    outputs = (*measurement.output_names, *(one.output.name for one in sensors))
-    rows = tuple([terminal.name for terminal in compiled.outputs].index(name) for name in outputs)
+    record = with_rows(measurement, more, sensors)
+    outputs, run = record.output_names, FreeRun(more, record)
+    rows = tuple(run.rows.tolist())
     view = LinearView(compiled, _lines(measurement), measurement.inputs, rows)
-    floor = _floor(more, measurement, noise, rows)
+    count = len(measurement.output_names)
+    # By what the nominal model would show.
+    signals = np.concatenate([measurement.outputs, run.outputs()[count:]])
+    floor = with_noise_of(noise, measurement.output_units, record.output_units[count:], signals)
     every = sites_of(compiled, measurement.output_names)
     wanted = [site for name in names for site in every if site.name == name]
     wanted = wanted or [site for site in every if site.kind in ("joint", "body")]
@@ -140,20 +162,6 @@ def _patterns(
     if not sites:
         return np.zeros((0, len(rows), 1), dtype=np.complex128), []
     return printed_patterns(view, sites, outputs, floor), sites
-
-
-def _floor(model: Model, measurement: Measurement, noise: NoiseFloor, rows: Sequence[int]) -> NoiseFloor:
-    """Noise of the log's outputs and the new ones, by what the nominal model would show."""
-    terminals = [model.compile().outputs[row] for row in rows]
-    count = len(measurement.output_names)
-    record = replace(
-        measurement,
-        outputs=np.zeros((len(rows), measurement.samples)),
-        output_names=tuple(one.name for one in terminals),
-        output_units=tuple(one.unit for one in terminals),
-    )
-    signals = np.concatenate([measurement.outputs, FreeRun(model, record).outputs()[count:]])
-    return with_noise_of(noise, measurement.output_units, record.output_units[count:], signals)
 
 
 def _lines(measurement: Measurement) -> RecordLines:
@@ -168,7 +176,3 @@ def _least(angles: Real) -> tuple[float, float]:
     """Smallest and mean angle between different sites."""
     apart = angles[np.triu_indices(len(angles), 1)]
     return float(apart.min()), float(apart.mean())
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]])

@@ -189,7 +189,9 @@ def _pair(location: Location, forces: Located | None) -> PairShare | None:
     if forces is None:
         return None
     first, second = forces.places
-    return PairShare(groups=(first.names, second.names), share=explained_share(location.tuned, forces.profile))
+    return PairShare(
+        groups=(first.names, second.names), share=explained_share(location.tuned.chi, forces.profile.chi)
+    )
 
 
 def _restoring(study: Study, causes: Causes, motion: Recovered) -> RestoringForce:

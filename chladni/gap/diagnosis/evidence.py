@@ -91,9 +91,9 @@ def any_law(study: Study, causes: Causes, said: Sequence[Cause]) -> AnyLaw | Non
     return AnyLaw(
         site=site.name,
         group=tuple(name for name in located.places[0].names if name != site.name),
-        force=explained_share(study.location.tuned, located.profile),
+        force=explained_share(study.location.tuned.chi, located.profile.chi),
         law=1.0 - left_by_any_law(study.location, located, site),
-        named=explained_share(causes.tuned, causes.best) if said else None,
+        named=explained_share(causes.tuned.chi, causes.best.chi) if said else None,
     )
 
 

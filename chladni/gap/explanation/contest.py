@@ -87,18 +87,15 @@ class Contest:
 
     def judged(self, hypothesis: Hypothesis, fit: OutputErrorFit) -> Contestant:
         """Weigh a fit on the samples that it didn't see."""
-        left, starts = self._left(hypothesis, fit), self._starts(fit)
+        left = self._left(hypothesis, fit)
         freedom = freedom_nats(self.run, fit, hypothesis.fitted, hypothesis.freed, left)
         return Contestant(
             hypothesis=hypothesis,
             fit=fit,
             held=fit.held_by_output,
             gap=held_gap(self.run.measurement.outputs, fit.outputs, ~self.training),
-            prior=fit.prior_cost,
             left=left,
-            freedom=freedom,
-            starts=starts,
-            log_evidence=left.log_likelihood - 0.5 * fit.prior_cost + freedom - starts,
+            log_evidence=left.log_likelihood - 0.5 * fit.prior_cost + freedom - self._starts(fit),
         )
 
     def _left(self, hypothesis: Hypothesis, fit: OutputErrorFit) -> Left:

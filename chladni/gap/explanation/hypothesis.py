@@ -57,27 +57,18 @@ class Contestant:
         ``[output]`` mean square of the whitened residual on the samples that the fit didn't see; 1 is noise.
     gap
         RMS of the residual over RMS of what was measured, on those samples, outputs scaled by their RMS.
-    prior
-        What the parameters pay for their distance from nominal, ``z'z``.
-    log_evidence
-        Nats, but for a constant that all hypotheses that were weighed together share.
-    starts
-        Nats that it pays for the states that its effects begin windows with, beyond those of the first.
     left
         What it leaves on the telling lines, of its laws' force and elsewhere.
-    freedom
-        Nats that its numbers cost, see `freedom_nats`.
+    log_evidence
+        Nats, but for a constant that all hypotheses that were weighed together share.
     """
 
     hypothesis: Hypothesis
     fit: OutputErrorFit
     held: Real
     gap: float
-    prior: float
     left: Left
-    freedom: float = 0.0
     log_evidence: float = 0.0
-    starts: float = 0.0
 
     @property
     def chi(self) -> float:

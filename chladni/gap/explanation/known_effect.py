@@ -13,7 +13,6 @@ from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import all_lines
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.tuning.output_error import OutputErrorFit
-from chladni.models.core.port import PortKind
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.effects.pair import TILDE
 from chladni.signals.arrays import Real
@@ -33,8 +32,8 @@ class KnownEffect(Value):
     """
 
     outputs: Real
-    displacement: Mapping[tuple[str, PortKind], Real]
-    velocity: Mapping[tuple[str, PortKind], Real]
+    displacement: Mapping[tuple[str, str], Real]
+    velocity: Mapping[tuple[str, str], Real]
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -68,7 +67,7 @@ class KnownEffect(Value):
         )
 
     @classmethod
-    def _of_forces(cls, run: FreeRun, fit: OutputErrorFit, forces: Mapping[tuple[str, PortKind], Real]) -> Self:
+    def _of_forces(cls, run: FreeRun, fit: OutputErrorFit, forces: Mapping[tuple[str, str], Real]) -> Self:
         measurement, compiled = run.measurement, run.compiled(fit.z)
         lines = all_lines(measurement.samples, measurement.sample_rate_hz)
         view = LinearView(compiled, lines, np.zeros_like(measurement.inputs), tuple(run.rows.tolist()))
@@ -108,9 +107,9 @@ class KnownEffect(Value):
             velocity=motion.velocity + sum(sign * self.velocity[key] for sign, key in parts),
         )
 
-    def _parts(self, site: Site) -> list[tuple[float, tuple[str, PortKind]]]:
+    def _parts(self, site: Site) -> list[tuple[float, tuple[str, str]]]:
         """Ports whose motions add up to a site's, each with its sign."""
-        plain: list[tuple[float, tuple[str, PortKind]]] = [(1.0, (site.name, site.kind))]
+        plain: list[tuple[float, tuple[str, str]]] = [(1.0, (site.name, site.kind))]
         if site.kind == "pair":
             plain = [(sign, (name, "body")) for sign, name in zip((-1.0, 1.0), site.name.split(TILDE), strict=True)]
         return [(sign, key) for sign, key in plain if key in self.displacement]

@@ -3,7 +3,6 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from scipy.optimize import nnls
@@ -40,8 +39,6 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.side_by_side import side_by_side
 from chladni.models.core.model import Model
 from chladni.signals.arrays import Real
-
-_Rough = tuple[Profile, Place]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,11 +114,10 @@ def locate(
     record = whole.on(_telling(whole))
     plain = profiled(record, (), tuned.z)
     rough = _roughly((*segments, record), plain, places, start)
-    ranked = _followed(record, _tied([one.chi for one, _ in rough], rough, LOCATED))
-    if ranked and ranked[0].profile.expected > 1 and _pays(plain, ranked[0].profile):
+    ranked = _followed(record, _tied(rough, LOCATED))
+    if ranked and ranked[0].profile.expected > 1 and ranked[0].profile.chi < LESS * plain.chi:
         record = record.with_noise(noise_behind(record, ranked[0].profile))
-        again = [(one.profile, one.places[0]) for one in ranked]
-        ranked = _followed(record, _tied([one.profile.chi for one in ranked], again, FORMS))
+        ranked = _followed(record, _tied(ranked, FORMS))
         plain = profiled(record, (), plain.z)
     return Location(
         problem=record,
@@ -129,28 +125,21 @@ def locate(
         ranked=tuple(ranked),
         segments=segments,
         shares=_shares(plain, rough),
-        places=tuple(place for _, place in rough),
+        places=tuple(one.places[0] for one in rough),
     )
 
 
-def located_pairs(location: Location, rough: int = LOCATED) -> list[Located]:
+def located_pairs(location: Location) -> list[Located]:
     """Profile forces at two places at a time; by rising misfit, none with one sensor.
 
     Two sensors don't tell pairs apart, since any two forces explain both; what is between them is whether the forces
-    follow laws.
-
-    Parameters
-    ----------
-    rough
-        Followed places that are paired with each other.
-
-    The first few, and those that explain as much, are paired with every other place too: beside the strongest force
-    that of a second one may explain nothing alone.
+    follow laws. The first few, and those that explain as much, are paired with every other place too: beside the
+    strongest force that of a second one may explain nothing alone.
     """
     problem = location.problem
     if len(problem.measured) < 2:
         return []
-    followed = list(location.ranked[:rough])
+    followed = list(location.ranked[:LOCATED])
     level = sum(one.profile.chi < ALIKE * followed[0].profile.chi for one in followed)
     leading = min(max(LEADS, level), PLACES)
     known = {one.places[0] for one in followed}
@@ -161,7 +150,7 @@ def located_pairs(location: Location, rough: int = LOCATED) -> list[Located]:
         sites = (first.places[0].sites[0], second.sites[0])
         profile = profiled(problem, sites, first.profile.z, share=GAINED)
         found.append(Located(places=(first.places[0], second), profile=profile))
-    return sorted(found, key=lambda one: one.profile.chi)
+    return _by_misfit(found)
 
 
 def _tuned_on_segments(model: Model, whole: LinearProblem, start: Real) -> tuple[tuple[LinearProblem, ...], Profile]:
@@ -202,17 +191,25 @@ def lowest_hz(model: Model, measurement: Measurement) -> float:
     return float(heard.min()) if heard.size else CYCLES_ASKED / measurement.duration_s
 
 
-def _roughly(problems: Sequence[LinearProblem], plain: Profile, places: Sequence[Place], start: Real) -> list[_Rough]:
+def _roughly(
+    problems: Sequence[LinearProblem], plain: Profile, places: Sequence[Place], start: Real
+) -> list[Located]:
     """Profile every place in a few steps; by rising misfit on the whole record, the last of the problems.
 
     An effect may have led a tuning without it far from the right parameters, so each place finds its own, on segments
     first. But they don't rank: the states at the start of each segment would explain most of what an effect does.
     """
     if len(problems[-1].measured) < 2:
-        return [(replace(plain, sites=(place.sites[0],)), place) for place in places]
-    places = _worth_a_profile(problems[-1], plain, places)
-    found = side_by_side(lambda place: (_rough_profile(problems, plain, place, start), place), places)
-    return sorted(found, key=lambda one: one[0].chi)
+        return [Located(places=(place,), profile=replace(plain, sites=(place.sites[0],))) for place in places]
+
+    def roughly(place: Place) -> Located:
+        sites, z = (place.sites[0],), start
+        for problem in problems[:-1]:
+            z = profiled(problem, sites, z, share=LITTLE).z
+        found = [profiled(problems[-1], sites, each, share=LITTLE) for each in (z, plain.z)]
+        return Located(places=(place,), profile=min(found, key=lambda one: one.cost))
+
+    return _by_misfit(side_by_side(roughly, _worth_a_profile(problems[-1], plain, places)))
 
 
 def _worth_a_profile(problem: LinearProblem, plain: Profile, places: Sequence[Place]) -> list[Place]:
@@ -223,26 +220,20 @@ def _worth_a_profile(problem: LinearProblem, plain: Profile, places: Sequence[Pl
     return [place for place in places if place not in pairs or place in kept]
 
 
-def _rough_profile(problems: Sequence[LinearProblem], plain: Profile, place: Place, start: Real) -> Profile:
-    sites, z = (place.sites[0],), start
-    for problem in problems[:-1]:
-        z = profiled(problem, sites, z, share=LITTLE).z
-    found = [profiled(problems[-1], sites, each, share=LITTLE) for each in (z, plain.z)]
-    return min(found, key=lambda one: one.cost)
-
-
-def _followed(record: LinearProblem, rough: Sequence[_Rough]) -> list[Located]:
+def _followed(record: LinearProblem, rough: Sequence[Located]) -> list[Located]:
+    """Profile places to the end."""
     # With one sensor all patterns are one place: nothing is known of it but that it explains all.
-    found = [
-        Located(places=(place,), profile=profiled(record, (place.sites[0],), profile.z)) for profile, place in rough
-    ]
+    return _by_misfit([replace(one, profile=profiled(record, one.profile.sites, one.profile.z)) for one in rough])
+
+
+def _by_misfit(found: Sequence[Located]) -> list[Located]:
     return sorted(found, key=lambda one: one.profile.chi)
 
 
-def _tied(chi: Sequence[float], rough: list[_Rough], least: int) -> list[_Rough]:
+def _tied(rough: list[Located], least: int) -> list[Located]:
     """Keep the first few, and those behind them that are as good."""
     # Less than noise isn't better than noise: beside a floor that is too high others make use of what is spare.
-    tied = sum(one < CLEARLY * max(chi[0], 1.0) for one in chi)
+    tied = sum(one.profile.chi < CLEARLY * max(rough[0].profile.chi, 1.0) for one in rough)
     return rough[: min(max(least, tied), 2 * LOCATED)]
 
 
@@ -252,38 +243,25 @@ def _telling(whole: LinearProblem) -> RecordLines:
     return telling_lines(power, samples=measurement.samples, sample_rate_hz=measurement.sample_rate_hz)
 
 
-def _pays(plain: Profile, found: Profile) -> bool:
-    return found.chi < LESS * plain.chi
-
-
-def _shares(tuned: Profile, rough: Sequence[_Rough]) -> dict[str, float]:
+def _shares(tuned: Profile, rough: Sequence[Located]) -> dict[str, float]:
     return {
-        site.name: explained_share(tuned, profile)
-        for profile, place in rough
+        site.name: explained_share(tuned.chi, one.profile.chi)
+        for one in rough
         # With one sensor no force was fitted anywhere: any would explain all, and none more than another.
-        if profile.forces
-        for site in place.sites
+        if one.profile.forces
+        for site in one.places[0].sites
     }
 
 
-class Left(Protocol):
-    """A fit that knows what it leaves: a profile, or a contestant."""
-
-    @property
-    def chi(self) -> float:
-        """Mean square over what noise alone leaves."""
-
-
-def explained_share(tuned: Left, profile: Left) -> float:
-    """Give the share of the misfit beyond noise that a fit with forces, or causes, explains, 0 to 1.
+def explained_share(without: float, chi: float) -> float:
+    """Give the share of the misfit beyond noise that forces, or causes, explain, 0 to 1.
 
     Parameters
     ----------
-    tuned
-        Without any.
+    without, chi
+        Mean squares over what noise alone leaves, without any and with them.
     """
-    gap = max(tuned.chi - 1.0, RIDGE)
-    return float(np.clip((tuned.chi - max(profile.chi, 1.0)) / gap, 0.0, 1.0))
+    return float(np.clip((without - max(chi, 1.0)) / max(without - 1.0, RIDGE), 0.0, 1.0))
 
 
 def sites_at(located: Located) -> Sequence[tuple[Site, tuple[Site, ...]]]:

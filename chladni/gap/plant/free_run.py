@@ -1,7 +1,7 @@
 """Free simulation of a model with a log's own inputs, as often as a fit wants it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -15,7 +15,6 @@ from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, Model
-from chladni.models.core.port import PortKind
 from chladni.models.core.simulation import PortMotion
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.hold import hold_of
@@ -24,25 +23,8 @@ from chladni.models.integrator.integrator import Integration, Integrator
 from chladni.models.integrator.trapezoid_march import Equations, Marched, equations, run_laws
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
-from chladni.signals.value import Value
 
 Windows = Sequence[tuple[int, int]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SiteMotion(Value):
-    """Motion at a site during a free run, ``[sample]``: relative displacement and velocity, and the laws' force.
-
-    `force` is that of the laws at the site, without its linear spring and damper; 0 when there's no law.
-    """
-
-    site: str
-    displacement: Real
-    velocity: Real
-    force: Real
-
-    def __post_init__(self) -> None:
-        self._freeze()
 
 
 class FreeRun:
@@ -182,7 +164,7 @@ class FreeRun:
         initial: Real | None = None,
         *,
         site: str,
-    ) -> SiteMotion:
+    ) -> PortMotion:
         """Motion at a joint, body or input of the model during the same run.
 
         Raises
@@ -192,7 +174,7 @@ class FreeRun:
         """
         if isinstance(self.model, BlackBox):
             joint = self.compiled().port_index(site, "joint")
-            return _site_motion(self._responded(self.model, z, effects).motions[joint])
+            return self._responded(self.model, z, effects).motions[joint]
         return self._motions(z, effects, initial, [self.compiled(z, effects).port_index(site)])[0]
 
     def law_motion(
@@ -212,26 +194,26 @@ class FreeRun:
 
     def motions(
         self, z: Real | None = None, effects: Sequence[AttachedEffect] = (), initial: Real | None = None
-    ) -> dict[tuple[str, PortKind], SiteMotion]:
+    ) -> dict[tuple[str, str], PortMotion]:
         """Motion at every port of the model during one run, by name and kind; see `outputs`."""
         if isinstance(self.model, BlackBox):
-            moved = self._responded(self.model, z, effects).motions
-            return {(one.name, "joint"): _site_motion(one) for one in moved}
-        ports = self.compiled(z, effects).ports
-        found = self._motions(z, effects, initial, range(len(ports)))
-        return {(port.name, port.kind): motion for port, motion in zip(ports, found, strict=True)}
+            found: Sequence[PortMotion] = self._responded(self.model, z, effects).motions
+        else:
+            found = self._motions(z, effects, initial, range(len(self.compiled(z, effects).ports)))
+        return {(one.name, one.kind): one for one in found}
 
     def _motions(
         self, z: Real | None, effects: Sequence[AttachedEffect], initial: Real | None, ports: Sequence[int]
-    ) -> list[SiteMotion]:
+    ) -> list[PortMotion]:
+        """Motions during a run; the force is 0 where no law acts."""
         compiled, runs = self.compiled(z, effects), self.integrations(z, effects, initial)
         columns = [self._columns(compiled, window) for window, _ in runs]
         found = []
         for port in ports:
             parts = [_port_motion(compiled, port, one, u) for (_, one), u in zip(runs, columns, strict=True)]
             displacement, velocity, force = np.concatenate(parts, axis=1)
-            site = compiled.ports[port].name
-            found.append(SiteMotion(site=site, displacement=displacement, velocity=velocity, force=force))
+            name, kind = compiled.ports[port].name, compiled.ports[port].kind
+            found.append(PortMotion(name=name, kind=kind, displacement=displacement, velocity=velocity, force=force))
         return found
 
     def integrations(
@@ -276,12 +258,6 @@ def _at(model: ModelT, tunables: Tunables, z: Real | None, effects: Sequence[Eff
     if z is not None and np.any(z):
         model = model.with_values(tunables.values(np.asarray(z, dtype=np.float64)))
     return model.with_effects((*model.effects, *effects)) if effects else model
-
-
-def _site_motion(motion: PortMotion) -> SiteMotion:
-    return SiteMotion(
-        site=motion.name, displacement=motion.displacement, velocity=motion.velocity, force=motion.force
-    )
 
 
 def mapped_outputs(compiled: CompiledModel, rows: Whole, outputs: Real, sample_rate_hz: float) -> Real:

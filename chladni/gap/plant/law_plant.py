@@ -1,6 +1,6 @@
 """A model with laws as a fit sees it: free runs, coarse or fine, and their slopes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -87,6 +87,19 @@ def _at_samples(equation: Equations, window: tuple[int, int], record: March) -> 
         motion=np.ascontiguousarray(record.motion[every]),
         force=np.ascontiguousarray(record.force[every]),
     )
+
+
+def around(setting: Callable[[Real], Setting], x: Real, steps: Real) -> list[tuple[Setting, float]]:
+    """Give what is set a step further along each unknown, ``setting(x [unknown])``, and by how much."""
+    return [(setting(x + row), float(by)) for row, by in zip(np.diag(steps), steps, strict=True)]
+
+
+def differences(run: FreeRun, changed: Sequence[tuple[Setting, float]], initial: Real, outputs: Real) -> Real:
+    """``[unknown, output, sample]``: slopes of outputs by runs that are a step further, see `around`."""
+    found = np.empty((len(changed), *outputs.shape))
+    for place, (there, by) in enumerate(changed):
+        found[place] = (run.outputs(there.z, there.effects, initial) - outputs) / by
+    return found
 
 
 def slopes_of(run: FreeRun, result: LawRunResult, changed: Sequence[tuple[Setting, float]]) -> tuple[Real, Real]:

@@ -1,6 +1,6 @@
 """Parameters that a fit may move, on the scale of how well they are believed."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Self
 
@@ -9,7 +9,6 @@ import numpy as np
 from chladni.gap.calibration import FURTHEST, OUTSIDE, SLIP, UNNOTICED
 from chladni.models.core.model import Model
 from chladni.signals.arrays import Mask, Real
-from chladni.signals.errors import ModelError
 from chladni.signals.value import Value, require_shape
 
 
@@ -80,22 +79,3 @@ class Tunables(Value):
         require_shape("z", z, (len(self.names),), "the tunable parameters")
         numbers = self.nominal * np.exp(self.tolerance * z)
         return dict(zip(self.names, numbers.tolist(), strict=True))
-
-    def z(self, values: Mapping[str, float]) -> Real:
-        """``[parameter]`` from values by name; those that are missing stay nominal.
-
-        Raises
-        ------
-        ModelError
-            When a name is not tunable, or a value lies on the other side of 0.
-        """
-        found = np.zeros(len(self.names))
-        for name, value in values.items():
-            if name not in self.names:
-                raise ModelError(f"{name!r} can't be tuned; tunable are {', '.join(self.names) or 'none'}")
-            place = self.names.index(name)
-            ratio = value / self.nominal[place]
-            if not (np.isfinite(ratio) and ratio > 0):
-                raise ModelError(f"{name} = {value:g} has another sign than its nominal {self.nominal[place]:g}")
-            found[place] = np.log(ratio) / self.tolerance[place]
-        return found

@@ -42,8 +42,6 @@ def windows_for(model: Model, measurement: Measurement) -> tuple[tuple[int, int]
     >>> windows = windows_for(model, log)
     >>> len(windows), windows[0], windows[-1]
     (11, (0, 909), (9091, 10000))
-    >>> round(horizon_s(windows, log.sample_rate_hz), 2)
-    0.91
     """
     return short_windows(model, measurement) if _lasting(_poles(model), measurement.duration_s).any() else None
 
@@ -55,11 +53,6 @@ def short_windows(model: Model, measurement: Measurement) -> tuple[tuple[int, in
     count = max(1, round(samples / float(length)))
     edges = np.round(np.linspace(0, samples, count + 1)).astype(int).tolist()
     return tuple(pairwise(edges))
-
-
-def horizon_s(windows: tuple[tuple[int, int], ...], sample_rate_hz: float) -> float:
-    """Mean length of the windows in seconds: how far ahead the model is asked to predict."""
-    return float(np.mean([stop - start for start, stop in windows]) / sample_rate_hz)
 
 
 def nested_windows(

@@ -71,9 +71,13 @@ class NoiseFloor(Value):
 
     def whitened(self, residual: Real) -> Real:
         """Give ``[..., output, sample]`` residuals as white noise of unit variance, were they noise alone."""
-        from scipy.signal import lfilter
-
+        if not np.any(self.whitening[:, 1:]):
+            return np.asarray(residual / self.innovation_rms[:, None])
         white = np.empty_like(residual)
-        for place, (filter_, scale) in enumerate(zip(self.whitening, self.innovation_rms, strict=True)):
-            white[..., place, :] = lfilter(filter_, [1.0], residual[..., place, :], axis=-1) / scale
+        count = residual.shape[-1]
+        for place, (own, scale) in enumerate(zip(self.whitening, self.innovation_rms, strict=True)):
+            lags = np.trim_zeros(own / scale, "b")
+            for index in np.ndindex(residual.shape[:-2]):
+                # A short filter costs a convolution a tenth of what it costs a recursive filter.
+                white[(*index, place)] = np.convolve(residual[(*index, place)], lags)[:count]
         return white

@@ -7,7 +7,7 @@ import numpy as np
 
 from chladni.gap.calibration import JITTER, RIDGE, RUNAWAY, STEP, UNNOTICED, WIDE, ZERO
 from chladni.gap.plant.free_run import FreeRun, initial_states
-from chladni.gap.plant.law_plant import LawRunResult, Setting, coarse_run, fine_run, slopes_of
+from chladni.gap.plant.law_plant import LawRunResult, Setting, around, coarse_run, differences, fine_run, slopes_of
 from chladni.gap.plant.linear_run import can_run, decay
 from chladni.gap.tuning.effect_scale import EffectNumber, with_numbers
 from chladni.gap.tuning.residual import Residual, Whitening, likelihood_cost, weights
@@ -97,7 +97,6 @@ class FitProblem:
         self.effects, self.numbers = tuple(effects), tuple(numbers)
         self.tuned = len(run.tunables.names) if tune else 0
         self.start_z = start_z
-        self.evaluations = 0
         limit, sure = run.tunables.limits(freed), run.tunables.precision(freed)
         limit = limit[: self.tuned] if held else np.full(self.tuned, np.inf)
         self.low = np.concatenate([-limit, [number.low for number in numbers]])
@@ -147,9 +146,12 @@ class FitProblem:
         """Run freely and judge; `ModelError` when the run diverges."""
         made = None
         if self.has_slopes:
-            self.evaluations += 1
             made = (coarse_run if self.coarse else fine_run)(self.run, self._setting(point.x), point.initial)
-        outputs = self._outputs(point.x, point.initial) if made is None else made.outputs
+        outputs = (
+            made.outputs
+            if made is not None
+            else self.run.outputs(self.z(point.x), self.effects_at(point.x), point.initial)
+        )
         residual = self.whitening.residual(self.run.measurement.outputs - outputs)
         cost = likelihood_cost(residual.power, self.whitening.samples) + self.prior_cost(point)
         return Evaluation(point, outputs, residual, cost, made)
@@ -241,18 +243,12 @@ class FitProblem:
             tuple((c - b[:, unknowns:] @ constant, b[:, :unknowns] - b[:, unknowns:] @ per) for c, b in back),
         )
 
-    def _outputs(self, x: Real, initial: Real) -> Real:
-        self.evaluations += 1
-        return self.run.outputs(self.z(x), self.effects_at(x), initial)
-
     def _columns(self, here: Evaluation, *, fresh: bool = False) -> tuple[Real, Callable[[int, int], Real]]:
         """Slopes ``[unknown, output, sample]``, and whitened ``[state, output, training sample]`` of each window."""
         if here.made is None:
             own = self._secants(here, fresh) if self.run.is_black_box else self._differences(here)
             return own, self._local(here.point)
-        steps = self._steps(here.point.x)
-        changed = [(self._setting(here.point.x + row), by) for row, by in zip(np.diag(steps), steps, strict=True)]
-        own, starts = slopes_of(self.run, here.made, changed)
+        own, starts = slopes_of(self.run, here.made, self._changed(here.point.x))
         white = self.whitening.whitened(starts)
         return own, lambda start, stop: white[..., start:stop][..., self.training[start:stop]]
 
@@ -273,13 +269,10 @@ class FitProblem:
         return columns
 
     def _differences(self, here: Evaluation) -> Real:
-        """``[unknown, output, sample]``: change of the outputs, by differences."""
-        columns = np.empty((here.point.x.size, *here.outputs.shape))
-        for place, by in enumerate(self._steps(here.point.x)):
-            x = here.point.x.copy()
-            x[place] += by
-            columns[place] = (self._outputs(x, here.point.initial) - here.outputs) / by
-        return columns
+        return differences(self.run, self._changed(here.point.x), here.point.initial, here.outputs)
+
+    def _changed(self, x: Real) -> list[tuple[Setting, float]]:
+        return around(self._setting, x, self._steps(x))
 
     def _steps(self, x: Real) -> Real:
         """Steps of each unknown, away from the nearer bound."""

@@ -45,20 +45,12 @@ class OutputErrorFit(Value):
         ``[output, sample]`` of the free run, offsets added.
     misfit
         Mean square of the whitened residual over the training samples; 1 when only noise is left.
-    misfit_by_output
-        ``[output]`` the same.
-    held_misfit
-        The same over the samples that the fit didn't see, None when it saw all.
     held_by_output
-        ``[output]`` the same, empty when it saw all.
+        ``[output]`` the same over the samples that the fit didn't see, empty when it saw all.
     prior_cost
         ``z.z``, of freed parameters over their own spread: what leaving the nominal values costs.
     cost
         Negative log-likelihood and half the prior cost, nats: what the fit made least.
-    converged
-        Whether no step promised more, within the iterations.
-    iterations, evaluations
-        Of the fit; evaluations are free runs.
     undetermined
         Names of the parameters that this log leaves as uncertain as they were: nothing but their tolerance keeps them
         near nominal, and they move with others that they depend on.
@@ -75,14 +67,9 @@ class OutputErrorFit(Value):
     offsets: Real
     outputs: Real
     misfit: float
-    misfit_by_output: Real
-    held_misfit: float | None
     held_by_output: Real
     prior_cost: float
     cost: float
-    converged: bool
-    iterations: int
-    evaluations: int
     undetermined: tuple[str, ...]
     covariance: Real
 
@@ -162,8 +149,8 @@ def fit_output_error(
     start = problem.start_of_windows() if problem.has_laws and len(run.windows) > 1 else problem.start()
     if start_initial is not None:
         start = Point(start.x, np.array(start_initial, dtype=np.float64).reshape(start.initial.shape))
-    here, slopes, converged, iterations = _fit(problem, start, max_iterations, precision)
-    return _report(problem, here, slopes, held=known & ~training, converged=converged, iterations=iterations)
+    here, slopes = _fit(problem, start, max_iterations, precision)
+    return _report(problem, here, slopes, held=known & ~training)
 
 
 def with_coloured_spread(
@@ -222,25 +209,24 @@ def _whitening(run: FreeRun, noise: NoiseFloor, training: Mask, offsets: bool) -
     return Whitening(seen, training, offsets=offsets)
 
 
-def _fit(problem: FitProblem, start: Point, most: int, precision: float) -> tuple[Evaluation, Slopes, bool, int]:
+def _fit(problem: FitProblem, start: Point, most: int, precision: float) -> tuple[Evaluation, Slopes]:
     """Coarsely first where that is quicker, then as finely as runs are made."""
     spent = 0
     if problem.coarse:
         # What a coarse run is wrong by is no reason to follow it further than this.
         enough = GAINED * problem.whitening.samples * problem.run.rows.size
         try:
-            found, _, _, spent = _descend(problem, problem.evaluate(start), most, enough)
+            found, _, spent = _descend(problem, problem.evaluate(start), most, enough)
             start = found.point
         except (ModelError, EstimateError):
             spent = 0
         problem.coarse = False
-    here, slopes, converged, more = _descend(
-        problem, problem.evaluate(start), max(most - spent, min(most, ITERATIONS // 3)), precision
-    )
-    return here, slopes, converged, spent + more
+    left = max(most - spent, min(most, ITERATIONS // 3))
+    return _descend(problem, problem.evaluate(start), left, precision)[:2]
 
 
-def _descend(problem: FitProblem, here: Evaluation, most: int, enough: float) -> tuple[Evaluation, Slopes, bool, int]:
+def _descend(problem: FitProblem, here: Evaluation, most: int, enough: float) -> tuple[Evaluation, Slopes, int]:
+    """Step until no step promises enough, at most so many times; also give how many iterations that took."""
     level, iterations = 0, 0
     slopes = problem.slopes(here)
     while iterations < most:
@@ -248,16 +234,16 @@ def _descend(problem: FitProblem, here: Evaluation, most: int, enough: float) ->
         iterations += not problem.stale
         found, promised, level = _search(problem, here, slopes, level)
         if found is None and not problem.stale:
-            return here, slopes, promised < enough, iterations
+            return here, slopes, iterations
         gained, here = (0.0, here) if found is None else (here.cost - found.cost, found)
         done = found is None or max(promised, gained) < enough
         if done and not problem.stale:
-            return here, slopes, True, iterations
+            return here, slopes, iterations
         try:
             slopes = problem.slopes(here, fresh=done)
         except EstimateError:
-            return here, slopes, False, iterations
-    return here, slopes, False, iterations
+            return here, slopes, iterations
+    return here, slopes, iterations
 
 
 def _search(
@@ -298,16 +284,13 @@ def _expected(slopes: Slopes, step: Real) -> float:
     return float(-(slopes.gradient @ step) - 0.5 * step @ slopes.curvature @ step)
 
 
-def _report(
-    problem: FitProblem, here: Evaluation, slopes: Slopes, *, held: Mask, converged: bool, iterations: int
-) -> OutputErrorFit:
+def _report(problem: FitProblem, here: Evaluation, slopes: Slopes, *, held: Mask) -> OutputErrorFit:
     x, run = here.point.x, problem.run
     z = problem.z(x)
     covariance = _inverse(slopes.curvature)
     offsets = here.residual.offsets
     outputs = here.outputs + offsets[:, None]
     white = problem.whitening.whitened(run.measurement.outputs - outputs)[:, held]
-    by_output = np.mean(white**2, axis=1) if held.any() else np.zeros(0)
     return OutputErrorFit(
         values=run.tunables.values(z),
         z=z,
@@ -316,14 +299,9 @@ def _report(
         offsets=offsets,
         outputs=outputs,
         misfit=float(np.mean(here.residual.power)),
-        misfit_by_output=here.residual.power,
-        held_misfit=float(np.mean(by_output)) if held.any() else None,
-        held_by_output=by_output,
+        held_by_output=np.mean(white**2, axis=1) if held.any() else np.zeros(0),
         prior_cost=2.0 * problem.prior_of(x),
         cost=here.cost,
-        converged=converged,
-        iterations=iterations,
-        evaluations=problem.evaluations,
         covariance=covariance,
         **_spreads(problem, x, covariance),
     )

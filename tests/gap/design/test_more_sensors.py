@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from chladni.gap.design.more_sensors import more_sensors, with_noise_of, with_sensors
+from chladni.gap.design.more_sensors import more_sensors, sensor_words, with_noise_of, with_sensors
 from chladni.models.drives.catalogue import DRIVES
 from chladni.models.drives.drive_model import drive_model
 from tests.gap.made_log import band_noise, measured, three_bodies, white_floor
@@ -9,7 +9,7 @@ from tests.gap.made_log import band_noise, measured, three_bodies, white_floor
 
 def words(outputs, suspects=()):
     log, _ = measured(three_bodies(), band_noise(512), outputs=outputs)
-    return [one.words for one in more_sensors(three_bodies(), log, suspects)]
+    return [sensor_words(one) for one in more_sensors(three_bodies(), log, suspects)]
 
 
 def test_bodies_without_an_accelerometer_in_the_log_may_get_one():

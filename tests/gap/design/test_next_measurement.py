@@ -206,7 +206,7 @@ def made(unknowns=3, states=2, outputs=2, samples=400, seed=0):
     own, starts = rng.standard_normal((unknowns, outputs, samples)), rng.standard_normal((states, outputs, samples))
     own -= own.mean(axis=-1, keepdims=True)
     starts -= starts.mean(axis=-1, keepdims=True)
-    return Prediction(np.zeros((outputs, samples)), own, starts, np.zeros(unknowns)), rng
+    return Prediction(np.zeros((outputs, samples)), own, starts), rng
 
 
 def part(wanted, prediction, noise, windows=None, scale=1.3):
@@ -289,7 +289,7 @@ def test_two_records_pin_what_each_alone_leaves_free():
 
 def test_states_that_print_nothing_harm_nothing():
     prediction, rng = made()
-    blank = Prediction(prediction.outputs, prediction.own, np.zeros((2, 2, 400)), prediction.at)
+    blank = Prediction(prediction.outputs, prediction.own, np.zeros((2, 2, 400)))
     wanted = np.tensordot(rng.standard_normal(3), prediction.own, 1)
     _, (left,) = imitated(Free(3), np.zeros(3), [part(wanted, blank, white_floor([1.0, 1.0]))])
     assert np.all(left < 1e-10)

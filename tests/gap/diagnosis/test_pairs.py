@@ -104,7 +104,7 @@ def test_two_forces_are_told_where_they_explain_much_more_than_one() -> None:
     found = pairs._two_forces(both, located_pairs(both))
     assert found is not None
     assert {name for place in found.places for name in place.names} >= {"hand", "acc_column"}
-    assert explained_share(both.tuned, found.profile) > max(both.shares.values())
+    assert explained_share(both.tuned.chi, found.profile.chi) > max(both.shares.values())
     one = location(SPRING)
     assert pairs._two_forces(one, located_pairs(one)) is None
 

@@ -21,9 +21,9 @@ def remarks(
         model=run.model, measurement=log, contest=SimpleNamespace(run=run), repeating=(), of_constant=None
     )
     study.constants = lambda fit, noise: Study.constants(study, fit, noise)
-    fit = SimpleNamespace(
-        z=run.tunables.z({"loop.ki": found_ki}), effects=(), undetermined=undetermined, offsets=np.array(offsets)
-    )
+    off = np.log(found_ki / ki) / run.tunables.tolerance
+    z = np.where(np.array(run.tunables.names) == "loop.ki", off, 0.0)
+    fit = SimpleNamespace(z=z, effects=(), undetermined=undetermined, offsets=np.array(offsets))
     causes = SimpleNamespace(distorted=(), constants={}, noise=white_floor([1e-6, 1e-6]))
     return remarks_on(study, causes, SimpleNamespace(fit=fit), None)
 

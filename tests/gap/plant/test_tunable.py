@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from chladni.gap.plant.tunable import Tunables
-from chladni.signals.errors import EstimateError, ModelError
+from chladni.signals.errors import EstimateError
 from tests.gap.made_log import chain, three_bodies
 
 
@@ -15,10 +15,11 @@ def test_a_sigma_is_the_tolerance_of_the_value():
     assert values["b0.mass"] == 2.0
 
 
-def test_values_and_z_are_inverse():
+def test_values_are_e_folds_of_the_tolerance():
     tunables = Tunables.of(three_bodies())
     z = np.random.default_rng(0).standard_normal(9)
-    np.testing.assert_allclose(tunables.z(tunables.values(z)), z, rtol=1e-12, atol=1e-12)
+    values = np.array([*tunables.values(z).values()])
+    np.testing.assert_allclose(np.log(values / tunables.nominal) / tunables.tolerance, z, rtol=1e-12, atol=1e-12)
 
 
 def test_what_is_zero_or_certain_does_not_move():
@@ -30,9 +31,5 @@ def test_what_is_zero_or_certain_does_not_move():
 
 def test_mistakes_are_named():
     tunables = Tunables.of(three_bodies())
-    with pytest.raises(ModelError, match=r"'j9\.stiffness' can't be tuned"):
-        tunables.z({"j9.stiffness": 1.0})
-    with pytest.raises(ModelError, match="another sign"):
-        tunables.z({"b0.mass": -1.0})
     with pytest.raises(EstimateError, match="shape"):
         tunables.values(np.zeros(3))

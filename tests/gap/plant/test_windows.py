@@ -8,7 +8,6 @@ from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.windows import (
     _horizon_s,
     _lasting,
-    horizon_s,
     nested_windows,
     short_windows,
     training_in_windows,
@@ -32,6 +31,10 @@ def log_of(model, samples=10_000, rate_hz=1000.0):
         output_names=tuple(one.name for one in compiled.outputs),
         output_units=tuple(one.unit for one in compiled.outputs),
     )  # fmt: skip
+
+
+def horizon_s(windows, sample_rate_hz):
+    return np.mean([stop - start for start, stop in windows]) / sample_rate_hz
 
 
 def test_a_damped_structure_needs_none():
