@@ -109,8 +109,6 @@ def scale_doubt(measured: Real, simulated: Real, output_names: Sequence[str]) ->
     ----------
     measured, simulated
         ``[output, sample]``, the latter of the nominal model.
-    output_names
-        Of the rows.
 
     Examples
     --------

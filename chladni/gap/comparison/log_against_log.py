@@ -32,8 +32,6 @@ class GapView(Value):
         Pooled over outputs: RMS of the residual over RMS of measured, each output scaled by its own.
     where
         Channels, bands, regimes, times; no sites, since those are a model's.
-    noise
-        Of the measured outputs.
     map_time_s, map_frequency_hz, map_density
         See `gap_map`.
     measured_split, simulated_split

@@ -89,8 +89,6 @@ def band_shares(
     ----------
     residual, measured
         ``[output, sample]``.
-    sample_rate_hz
-        Samples a second.
     noise
         Floor of the outputs: how much of the gap in each band it can be is told too.
 

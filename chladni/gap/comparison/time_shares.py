@@ -24,8 +24,6 @@ def time_shares(residual: Real, measured: Real, *, sample_rate_hz: float) -> tup
     ----------
     residual, measured
         ``[output, sample]``.
-    sample_rate_hz
-        Samples a second.
 
     Returns
     -------

@@ -51,8 +51,6 @@ def whole_stretch(
 
     Parameters
     ----------
-    rows
-        That are used.
     needed
         Those of them that a model can't do without: its inputs.
 

@@ -23,8 +23,6 @@ class Course:
     ----------
     experiment
         What is done; its model has all sensors that may be used.
-    rivals
-        The candidates.
     measurement
         What the experiment's record would be like: names, rate, length.
     windows
@@ -72,8 +70,6 @@ class Course:
 
         Parameters
         ----------
-        noise
-            Of all outputs.
         detail
             ``[output]`` share of an output's power that even the right law would leave.
         chosen
@@ -123,8 +119,6 @@ class Separation:
     ----------
     rivals
         The first is compared with each other one.
-    noise
-        Of all outputs.
     detail
         ``[output]`` share of an output's power that even the right law would leave.
     """

@@ -27,8 +27,6 @@ class Experiment(Value):
 
     Attributes
     ----------
-    change
-        What kind of change it is.
     words
         What to do, as the beginning of a sentence.
     model

@@ -26,8 +26,6 @@ class Reach:
 
     Attributes
     ----------
-    model
-        Nominal.
     measurement
         The log, or a stretch of it.
     begins_with_log

@@ -32,12 +32,6 @@ def next_measurement(
 
     Parameters
     ----------
-    study_model
-        Nominal model.
-    measurement, noise
-        The log, and the noise of its outputs.
-    tunables
-        Of the model.
     candidates
         Two or more, fitted to this log, best first; the first three are compared.
     seed
@@ -73,8 +67,6 @@ def sentence(designs: Sequence[Design], candidates: Sequence[Contestant], tried:
 
     Parameters
     ----------
-    candidates
-        That are to be told apart.
     tried
         Kinds of changes that were looked at.
 

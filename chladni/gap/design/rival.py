@@ -37,15 +37,7 @@ class Prediction:
 
 
 class Rival:
-    """One fitted candidate.
-
-    Parameters
-    ----------
-    contestant
-        With its fit.
-    tunables
-        Of the model.
-    """
+    """One fitted candidate."""
 
     def __init__(self, contestant: Contestant, tunables: Tunables) -> None:
         fit, hypothesis = contestant.fit, contestant.hypothesis
@@ -121,8 +113,6 @@ class Part:
         ``[window, output, column, column]`` of products, see `sums_of`.
     scale
         ``[output]`` mean square of the whitened residual that isn't held against a candidate.
-    samples
-        Of the record.
     """
 
     sums: Real

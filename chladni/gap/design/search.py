@@ -36,8 +36,6 @@ class Search:
 
     Parameters
     ----------
-    model, measurement, tunables, noise
-        Nominal model, log, and the noise of its outputs.
     candidates
         Fitted, best first.
     seed

@@ -37,10 +37,6 @@ def what_is_missing(
 
     Parameters
     ----------
-    model
-        Nominal.
-    measurement, noise
-        The log, and the noise of its outputs.
     sites
         Names of the most likely sites, best first; every joint and body without any.
 

@@ -38,14 +38,10 @@ class Belief:
 
     Parameters
     ----------
-    location
-        Of the log.
     contestants
         All that were fitted, the one without causes first.
     pair
         Unknown forces at two places that explain much more than one, None without.
-    kinds
-        Effects that take part.
     told
         Names of sensors whose error needs no fit to be told: nothing unknown acts there.
     windows

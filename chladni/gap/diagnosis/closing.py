@@ -21,8 +21,6 @@ class Yardstick:
 
     Attributes
     ----------
-    measurement
-        The log.
     held
         ``[sample]`` that no fit saw.
     noise

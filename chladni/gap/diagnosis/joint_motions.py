@@ -20,8 +20,6 @@ def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) ->
     ----------
     fit
         Of the model whose run is believed.
-    known
-        Motion that was recovered, None without.
     """
     moved = _of_run(study, fit)
     if known is not None and known.site.kind == "joint":

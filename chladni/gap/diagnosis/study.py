@@ -56,8 +56,6 @@ class Study:
         Outputs whose samples stand on a lattice that is coarse beside their noise, by name.
     repeating
         Outputs that hold their samples, without standing on a lattice.
-    kinds
-        Effects that take part.
     """
 
     model: Model

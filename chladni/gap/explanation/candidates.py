@@ -29,8 +29,6 @@ def screened(
 
     Parameters
     ----------
-    kinds
-        Effects that take part.
     known
         What was taken from the log before it was located, when another effect is known already.
     """

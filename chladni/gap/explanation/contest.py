@@ -41,10 +41,6 @@ class Contest:
 
     Parameters
     ----------
-    run
-        The model driven by the log.
-    noise
-        Of the outputs.
     training
         ``[sample]`` what fits may see.
     states

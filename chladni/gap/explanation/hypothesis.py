@@ -23,8 +23,6 @@ class Hypothesis:
         For each effect the names of the parameters that move.
     freed
         Names of parameters whose value may be wrong.
-    start_z
-        Where the parameters start.
     screened
         Misfit over noise of the screen, None when it wasn't screened.
     initial

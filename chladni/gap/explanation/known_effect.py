@@ -128,8 +128,6 @@ class KnownStates(Value):
 
     Attributes
     ----------
-    names
-        Of the states.
     values
         ``[state, sample]``, but for their means, which no accelerometer tells.
     """

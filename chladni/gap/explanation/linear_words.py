@@ -132,8 +132,6 @@ def linear_elsewhere(
     ----------
     model
         Of the location's problem.
-    kinds
-        Effects that take part.
     screened
         Forms at the places that were followed: what leaves many times as much as the best isn't worth a fit.
     """
@@ -160,8 +158,6 @@ def linear_beside(
     ----------
     model
         Of the location's problem.
-    kinds
-        Effects that take part.
     kept
         Linear ones.
     z

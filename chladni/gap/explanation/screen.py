@@ -26,8 +26,6 @@ class HeldSite:
         Of the whole record.
     z
         ``[parameter]`` held.
-    site
-        Of the forces.
     others
         Sites whose force may be anything meanwhile.
     """
@@ -123,8 +121,6 @@ class Regression:
         ``[parameter, number]`` of the parameters.
     z
         ``[parameter]`` where these are, in units of their tolerance.
-    limit
-        Bounds on them.
     """
 
     def __init__(self, rest: Real, slopes: Real, z: Real, limit: float | Real) -> None:
@@ -188,8 +184,6 @@ class Screen:
         Of the whole record.
     found
         Profile of the place: its parameters, transient and force are where the linearisation is made.
-    site
-        Of the trials.
     others
         Sites whose force may be anything meanwhile.
     limit

@@ -30,8 +30,6 @@ class Shot:
     ----------
     hypothesis
         With the values that the windows led to.
-    fit
-        Over the windows.
     misfit
         Mean square of the whitened residual in the median window, 1 is noise: a few that began at a state from which
         the search didn't find to the machine's say nothing of the law.

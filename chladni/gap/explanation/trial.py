@@ -23,10 +23,6 @@ class SiteTrial:
     ----------
     kind
         The effect; None of a law that has no name.
-    site
-        Where.
-    form
-        The law along the motion there.
     """
 
     kind: EffectKind | None = None
@@ -64,8 +60,6 @@ def trials_at(
         What sensors showed in all, even where the problem is of a part of it.
     band_hz
         Where the excitation has power.
-    kinds
-        Effects that take part.
     """
     site = motion.site
     known = TrialMotion(

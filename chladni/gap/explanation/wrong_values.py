@@ -34,13 +34,6 @@ def wrong_values(location: Location, tunables: Tunables) -> list[Hypothesis]:
 
     Forward selection: each parameter is tried from factors of a tenth to ten of its value, on short segments first,
     which forgive a resonance that lies elsewhere; the best is freed, and the next one looked for beside it.
-
-    Parameters
-    ----------
-    location
-        Of the log.
-    tunables
-        Its parameters.
     """
     found = _selected(location, tunables, location.tuned, ())
     return [Hypothesis(start_z=one.profile.z, screened=one.profile.chi) for one in found]

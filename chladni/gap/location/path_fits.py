@@ -99,8 +99,6 @@ def pattern_losses(paths: ModalPaths, direction: Real, change: Complex) -> Real:
 
     Parameters
     ----------
-    paths
-        Of the modal model.
     direction
         ``[output]`` of the force over the sensors.
     change

@@ -21,8 +21,6 @@ class Profile:
 
     Attributes
     ----------
-    sites
-        Where.
     z
         Parameters in units of their tolerance.
     transient

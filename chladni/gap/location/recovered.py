@@ -21,8 +21,6 @@ class Recovered(Value):
 
     Attributes
     ----------
-    site
-        Where.
     lines
         On which trials are weighed.
     force

@@ -78,11 +78,6 @@ class BlackBoxRuns:
     """Runs of a black box under one log, at any parameters, and its answers to pulses.
 
     Signals are rows of ``[signal, sample]``: the measured outputs, then displacement and velocity of each joint.
-
-    Parameters
-    ----------
-    box, tunables, measurement
-        What runs, what may vary, and under what.
     """
 
     def __init__(self, box: BlackBox, tunables: Scaled, measurement: Measurement) -> None:

@@ -20,8 +20,6 @@ class LaidInputs:
     ----------
     signals
         ``[input, sample]`` of the whole record.
-    sample_rate_hz
-        Of the log.
     """
 
     def __init__(self, signals: Real, sample_rate_hz: float) -> None:
@@ -34,8 +32,6 @@ class LaidInputs:
 
         Parameters
         ----------
-        hold
-            Of the compiled model.
         parts
             Steps between samples.
 

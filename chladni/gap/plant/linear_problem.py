@@ -28,8 +28,6 @@ class LinearProblem:
 
     Parameters
     ----------
-    model, measurement, noise, tunables, lines
-        What is compared, and where.
     neighbours
         Equations that problems of one model share.
     """

@@ -28,13 +28,7 @@ def can_run(compiled: CompiledModel) -> bool:
 
 
 class LinearRuns:
-    """Linear free runs under the inputs of one log.
-
-    Parameters
-    ----------
-    inputs
-        Of the log.
-    """
+    """Linear free runs under the inputs of one log."""
 
     def __init__(self, inputs: LaidInputs) -> None:
         self._inputs, self._rate_hz = inputs, inputs.sample_rate_hz

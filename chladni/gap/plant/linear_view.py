@@ -95,8 +95,6 @@ class LinearView:
     ----------
     compiled
         The model; laws and maps of samples are left out.
-    lines
-        Where.
     signals
         ``[input, sample]`` of the log.
     rows

@@ -38,13 +38,7 @@ class Varied(Protocol):
 
 
 class Neighbours:
-    """Equations of one model, kept while they are asked for again.
-
-    Parameters
-    ----------
-    model, tunables
-        What varies.
-    """
+    """Equations of one model, kept while they are asked for again."""
 
     def __init__(self, model: Varied, tunables: Scaled) -> None:
         self._model, self._tunables = model, tunables

@@ -14,13 +14,7 @@ from chladni.signals.arrays import Complex
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
-    """A joint, body, input, output or the ground.
-
-    Attributes
-    ----------
-    name, kind
-        As in the model.
-    """
+    """A joint, body, input, output or the ground."""
 
     name: str
     kind: PortKind

@@ -21,8 +21,6 @@ class Tunables(Value):
 
     Attributes
     ----------
-    names
-        In the model.
     nominal
         ``[parameter]``, SI.
     tolerance

@@ -41,8 +41,6 @@ def view_slopes(
         Models of the `same_frame` whose equations are changed a little.
     step
         By how much, in the unit that derivatives are wanted for.
-    transient, forces
-        Of the response.
     """
     n, count = len(view.compiled.states), len(changed)
     signals = [view.states(transient, forces), view.inputs()]

@@ -57,8 +57,6 @@ class Laws(NamedTuple):
         ``[joint]`` position where the joint's spring is at rest.
     state, trial, rates, nudged
         ``[law state]``; `rates` and `nudged` are work space.
-    numbers
-        What the laws read.
     address
         ``[3]`` of `trial`, `rates` and `nudged`.
     """

@@ -24,8 +24,6 @@ class WrappedSimulator:
 
     Attributes
     ----------
-    simulator
-        What simulates.
     values
         Parameters that differ from the simulator's own, by name.
     effects
@@ -157,8 +155,6 @@ def with_signals_changed(
     ----------
     signals
         ``[terminal, sample]``.
-    terminals
-        What the rows are.
     effects
         At sites among `terminals`, in the order of the signal.
     kind

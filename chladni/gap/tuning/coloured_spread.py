@@ -17,11 +17,6 @@ def coloured_information(problem: FitProblem, here: Evaluation, slopes: Slopes) 
     of output j's residual and S_j its change with the unknowns, and the covariance is ``M^-1 (that) M^-1`` (Morelli
     and Klein, *Accuracy of aerodynamic model parameters estimated from flight test data*, J. Guidance, Control, and
     Dynamics 20(1), 1997). The prior belongs to it.
-
-    Parameters
-    ----------
-    problem, here, slopes
-        Of the fit, where it ended.
     """
     moved = problem.followed(here, slopes)
     found = problem.prior_information(moved.shape[0])

@@ -20,8 +20,6 @@ class EffectNumber:
     ----------
     effect
         Place of the effect.
-    name
-        Of its parameter.
     start
         Value at x = 0.
     scale

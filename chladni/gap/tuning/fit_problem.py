@@ -62,18 +62,8 @@ class FitProblem:
 
     Parameters
     ----------
-    run
-        The model driven by the log.
-    whitening
-        Of the outputs, on the training samples.
-    training
-        ``[sample]``.
-    effects
-        With their start values.
     numbers
         Which of their parameters move.
-    tune
-        Whether the model's parameters move too.
     freed
         Names of parameters that may be wrong by a slip, see `Tunables`.
     start_z

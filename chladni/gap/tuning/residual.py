@@ -34,8 +34,6 @@ class Whitening:
 
     Parameters
     ----------
-    noise
-        Of each output.
     training
         ``[sample]``: what the fit may see.
     offsets
