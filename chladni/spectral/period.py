@@ -130,7 +130,7 @@ def _period_of(series: TimeSeries, row: int, run: Run) -> Period | None:
     excitation = np.asarray(series.values[row, first:last], dtype=np.float64)
     if excitation.size < FEWEST_PERIODS * SHORTEST_PERIOD:
         return None
-    correlation = _self_correlation(excitation - excitation.mean())
+    correlation = self_correlation(excitation - excitation.mean())
     found = None
     for lag in _candidates(correlation):
         length = _refine(correlation, lag)
@@ -185,7 +185,7 @@ def _active(series: TimeSeries, row: int, run: Run) -> Run:
     return first + int(loud[0]) * size, (last if loud[-1] == blocks - 1 else first + int(loud[-1] + 1) * size)
 
 
-def _self_correlation(signal: Real) -> Real:
+def self_correlation(signal: Real) -> Real:
     """Correlate a signal with itself at lags up to half its length, each over the power of the parts compared."""
     lags = signal.size // 2 + 1
     padded = fft.next_fast_len(signal.size + lags, real=True)

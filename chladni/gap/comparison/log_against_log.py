@@ -10,8 +10,7 @@ from chladni.gap.comparison.distortion import Distortion, distortion_where_told
 from chladni.gap.comparison.log_regimes import log_regimes
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
-from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, pooled_gap
-from chladni.gap.comparison.time_shares import time_shares
+from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, pooled_gap, time_shares
 from chladni.gap.records.diagnosis import Where
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy import fft
 
 from chladni.gap.calibration import (
     BLOCK,
@@ -19,6 +18,7 @@ from chladni.gap.calibration import (
 )
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Real
+from chladni.spectral.period import self_correlation
 
 
 def with_period(measurement: Measurement) -> Measurement:
@@ -90,7 +90,7 @@ def _candidates(inputs: Real) -> list[int]:
     lags = samples // 2 + 1
     if lags <= BLOCK:
         return []
-    correlation = np.min([_self_correlation(row - row.mean(), lags) for row in inputs], axis=0)
+    correlation = np.min([self_correlation(row - row.mean()) for row in inputs], axis=0)
     # The last lag is looked at as if what follows were lower: exactly two periods are two periods.
     padded = np.append(correlation, -1.0)
     inner = padded[1:-1]
@@ -100,17 +100,6 @@ def _candidates(inputs: Real) -> list[int]:
         # Of a narrow band every cycle is a maximum; the highest ones hold the period.
         peaks = np.sort(peaks[np.argsort(-correlation[peaks], kind="stable")[: 4 * MANY]])
     return [int(lag) for lag in peaks]
-
-
-def _self_correlation(signal: Real, lags: int) -> Real:
-    """Correlate a signal with itself at lags from 0, over the power of the parts compared."""
-    size = fft.next_fast_len(signal.size + lags, real=True)
-    spectrum = fft.rfft(signal, size)
-    products = fft.irfft(spectrum.real**2 + spectrum.imag**2, size)[:lags]
-    power = np.concatenate([[0.0], np.cumsum(signal**2)])
-    shift = np.arange(lags)
-    norm = np.sqrt(power[signal.size - shift] * (power[-1] - power[shift]))
-    return np.asarray(np.divide(products, norm, out=np.zeros(lags), where=norm > 0), dtype=np.float64)
 
 
 def _scatter(inputs: Real, lag: int) -> float:

@@ -86,7 +86,7 @@ def sentence(designs: Sequence[Design], candidates: Sequence[Contestant], tried:
             f"Nothing that was tried ({_alternatives(tried)}) tells {both} apart: the best, '{first.words}', would "
             f"bring them to {first.sigmas:.2g} sigma (now {now}). Take them as one answer."
         )
-    more = [f"; or {_lowered(one.words)}: {one.sigmas:.2g} sigma" for one in designs[1:]]
+    more = [f"; or {one.words[0].lower()}{one.words[1:]}: {one.sigmas:.2g} sigma" for one in designs[1:]]
     least = "at least " if len(candidates) > 2 else ""
     return f"{first.words}: {both} then differ by {least}{first.sigmas:.2g} sigma (now {now}){''.join(more)}."
 
@@ -133,7 +133,3 @@ def _whole(one: Candidate) -> str:
     if one.effect == PARAMETER:
         return f"another value of {one.site}"
     return f"{spoken_effect(one.effect)} at {one.site}"
-
-
-def _lowered(words: str) -> str:
-    return words[0].lower() + words[1:]

@@ -7,13 +7,12 @@ from typing import Literal
 from chladni.gap.calibration import COVERAGE
 from chladni.gap.comparison.distortion import distortion_where_told
 from chladni.gap.comparison.levels import compare_levels
+from chladni.gap.comparison.log_regimes import amplitude
 from chladni.gap.comparison.periodicity import with_period
-from chladni.gap.comparison.shares import Variable, band_shares, channel_gaps, gap_map, regime_shares
-from chladni.gap.comparison.time_shares import time_shares
+from chladni.gap.comparison.shares import Variable, band_shares, channel_gaps, gap_map, regime_shares, time_shares
 from chladni.gap.diagnosis.advice import advice_on, measure_next
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.evidence import any_law, evidence
-from chladni.gap.diagnosis.joint_motions import joint_motions
 from chladni.gap.diagnosis.naming import (
     causes_named,
     correlation_of,
@@ -26,7 +25,7 @@ from chladni.gap.diagnosis.other_logs import tried_elsewhere
 from chladni.gap.diagnosis.remarks import remarks_on
 from chladni.gap.diagnosis.study import Study, study_of
 from chladni.gap.diagnosis.verdict import Causes, causes_found
-from chladni.gap.location.locate import Located, Location, explained_share
+from chladni.gap.location.locate import Located, Location, explained_share, lowest_hz
 from chladni.gap.location.recovered import Recovered
 from chladni.gap.plant.places import Site
 from chladni.gap.records.diagnosis import (
@@ -38,7 +37,7 @@ from chladni.gap.records.diagnosis import (
     Where,
 )
 from chladni.gap.records.measurement import Measurement
-from chladni.gap.tuning.output_error import fit_output_error
+from chladni.gap.tuning.output_error import OutputErrorFit, fit_output_error
 from chladni.models.core.model import Model
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.arrays import Real
@@ -253,3 +252,39 @@ def _signals(study: Study, causes: Causes, before: Real, after: Real) -> GapSign
         # Each sensor predicted from the others knows of no windows.
         window_starts=() if causes.shaken is not None else tuple(start for start, _ in study.windows or ()),
     )
+
+
+def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) -> dict[str, Variable]:
+    """Give displacement, velocity and amplitude of every joint, by names such as ``elbow.velocity``.
+
+    They're those of a fitted model's run, but at the site whose motion was recovered: the sensors tell that without
+    any law. A run that diverges tells nothing, and a joint whose motion can't be told is left out.
+
+    Parameters
+    ----------
+    fit
+        Of the model whose run is believed.
+    """
+    moved = _of_run(study, fit)
+    if known is not None and known.site.kind == "joint":
+        moved[known.site.name] = known.displacement, known.velocity
+    period = round(study.measurement.sample_rate_hz / lowest_hz(study.model, study.measurement))
+    found: dict[str, Variable] = {}
+    for port in study.contest.run.compiled().ports:
+        if port.kind != "joint" or port.name not in moved:
+            continue
+        displacement, velocity = moved[port.name]
+        unit = port.displacement_unit
+        found[f"{port.name}.displacement"] = Variable(displacement, unit)
+        found[f"{port.name}.velocity"] = Variable(velocity, f"{unit}/s")
+        found[f"{port.name}.amplitude"] = Variable(amplitude(displacement, period), unit)
+    return found
+
+
+def _of_run(study: Study, fit: OutputErrorFit) -> dict[str, tuple[Real, Real]]:
+    """Displacement and velocity of each joint during a fitted model's run, by name."""
+    try:
+        found = study.contest.run.motions(fit.z, fit.effects, fit.initial)
+    except ModelError:
+        return {}
+    return {name: (one.displacement, one.velocity) for (name, kind), one in found.items() if kind == "joint"}

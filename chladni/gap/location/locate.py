@@ -31,9 +31,9 @@ from chladni.gap.comparison.doubts import modes_of
 from chladni.gap.comparison.whitening import noise_floor_of
 from chladni.gap.location.profile import Profile, Projection, profile_at, profiled
 from chladni.gap.plant.linear_problem import LinearProblem
-from chladni.gap.plant.neighbours import Scaled
 from chladni.gap.plant.places import Place, Site, placed, sites_of
 from chladni.gap.plant.record_lines import RecordLines, all_lines, segment_lines, telling_lines
+from chladni.gap.plant.tunable import Scaled
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.side_by_side import side_by_side

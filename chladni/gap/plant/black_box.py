@@ -10,8 +10,8 @@ from scipy.ndimage import uniform_filter1d
 from chladni.gap.calibration import AHEAD, GRANTED, KEPT, MANY, NUDGE, SLIGHT, SMOOTH, WIDE, Z_GRID
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.linear_view import Way
-from chladni.gap.plant.neighbours import Scaled
 from chladni.gap.plant.record_lines import RecordLines
+from chladni.gap.plant.tunable import Scaled
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model

@@ -6,17 +6,18 @@ from typing import Self, cast
 
 import numpy as np
 
-from chladni.gap.calibration import LAW_ERROR, SPARE_BYTES, STEP, THREADS
+from chladni.gap.calibration import KEPT, LAW_ERROR, SPARE_BYTES, STEP, THREADS
 from chladni.gap.plant.black_box import BlackBox, BlackBoxRuns
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.linear_view import LinearView, View, Way
-from chladni.gap.plant.neighbours import Neighbours, Scaled, Varied
 from chladni.gap.plant.places import Site, way_to
 from chladni.gap.plant.record_lines import RecordLines
+from chladni.gap.plant.tunable import Scaled, Varied
 from chladni.gap.plant.view_slopes import same_frame, view_slopes
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.compiled_model import CompiledModel
+from chladni.models.effects.pair import PairPorts, unlinked_pairs
 from chladni.signals.arrays import Complex, Real
 
 #: Complex numbers that slopes of some parameters at once may need beside their result: a quarter of what is spare.
@@ -40,7 +41,7 @@ class LinearProblem:
         tunables: Scaled,
         lines: RecordLines,
         *,
-        neighbours: Neighbours | BlackBoxRuns | None = None,
+        neighbours: "Neighbours | BlackBoxRuns | None" = None,
     ) -> None:
         self.model, self.measurement, self.tunables, self.lines = model, measurement, tunables, lines
         self.noise = noise
@@ -151,7 +152,7 @@ class LinearProblem:
         return np.asarray(slope, dtype=np.complex128)
 
 
-def _neighbours(model: Varied, tunables: Scaled, measurement: Measurement) -> Neighbours | BlackBoxRuns:
+def _neighbours(model: Varied, tunables: Scaled, measurement: Measurement) -> "Neighbours | BlackBoxRuns":
     if isinstance(model, BlackBox):
         return BlackBoxRuns(model, tunables, measurement)
     return Neighbours(model, tunables)
@@ -212,3 +213,34 @@ class _Made:
     def compile(self) -> CompiledModel:
         parameters = {name: one for name, one in self.given.items() if name not in self.further}
         return self.make(parameters, np.array([self.given.get(name, 0.0) for name in self.further]))
+
+
+class Neighbours:
+    """Equations of one model, kept while they are asked for again."""
+
+    def __init__(self, model: Varied, tunables: Scaled) -> None:
+        self._model, self._tunables = model, tunables
+        # Where bodies share no joint the model may lack one. Which do is the same at all numbers.
+        compiled = model.compile()
+        self._pairs = PairPorts(compiled, unlinked_pairs(compiled))
+        self._at: Kept[CompiledModel] = Kept(KEPT)
+        self._changed: Kept[tuple[CompiledModel, ...]] = Kept(KEPT)
+
+    def at(self, z: Real) -> CompiledModel:
+        """Give the equations at ``z [parameter]``, in units of their tolerance."""
+        return self._at.get(z.tobytes(), lambda: self._linked(self._set(z)))
+
+    def changed(self, z: Real) -> tuple[CompiledModel, ...]:
+        """``[parameter]``: equations with each parameter `STEP` further than at z."""
+        return self._changed.get(z.tobytes(), lambda: self._steps(z))
+
+    def _set(self, z: Real) -> Varied:
+        return self._model.with_values(self._tunables.values(z)) if z.size else self._model
+
+    def _steps(self, z: Real) -> tuple[CompiledModel, ...]:
+        # From the model at z each takes one new number.
+        base, there = self._set(z), self._tunables.values(z + STEP)
+        return tuple(self._linked(base.with_values({name: there[name]})) for name in self._tunables.names)
+
+    def _linked(self, model: Varied) -> CompiledModel:
+        return self._pairs.of(model.compile())

@@ -1,12 +1,13 @@
 """Parameters that a fit may move, on the scale of how well they are believed."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 
 from chladni.gap.calibration import FURTHEST, OUTSIDE, SLIP, UNNOTICED
+from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.signals.arrays import Mask, Real
 from chladni.signals.value import Value, require_shape
@@ -77,3 +78,30 @@ class Tunables(Value):
         require_shape("z", z, (len(self.names),), "the tunable parameters")
         numbers = self.nominal * np.exp(self.tolerance * z)
         return dict(zip(self.names, numbers.tolist(), strict=True))
+
+
+class Scaled(Protocol):
+    """Parameters that may move, in units of their tolerance."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names."""
+
+    def values(self, z: Real) -> Mapping[str, float]:
+        """Values ``nominal exp(tolerance z)`` by name."""
+
+    def wrong(self, z: Real) -> tuple[str, ...]:
+        """Names of those outside their tolerance."""
+
+    def limits(self, freed: Collection[str] = ()) -> Real:
+        """``[parameter]`` bounds on ``abs(z)``."""
+
+
+class Varied(Protocol):
+    """A model as far as its equations and numbers go."""
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """Give the model with some parameters replaced."""
+
+    def compile(self) -> CompiledModel:
+        """Give the equations."""

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from chladni.gap.calibration import CLOSE, COVERAGE, LAPSE, LEAST_SHARE, NAMED, SIGMAS, TEMPER
-from chladni.gap.comparison.shares import Variable, band_shares, regime_shares, relative_residual
-from chladni.gap.comparison.time_shares import time_shares
+from chladni.gap.comparison.shares import Variable, band_shares, regime_shares, relative_residual, time_shares
 from chladni.gap.records.diagnosis import (
     PARAMETER,
     Candidate,

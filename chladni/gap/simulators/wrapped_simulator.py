@@ -99,7 +99,7 @@ class WrappedSimulator:
     def compile(self) -> CompiledModel:
         """Give inputs, outputs and joints, with nothing in between."""
         inputs = [replace(one, hold=one.hold or "foh") for one in self.simulator.inputs]
-        return unconnected(inputs, self.simulator.outputs, self.simulator.joints)
+        return equations(inputs=inputs, outputs=self.simulator.outputs, ports=self.simulator.joints)
 
     def flags(self, simulation: Simulation) -> tuple[str, ...]:  # noqa: ARG002 - what a model offers
         """None."""
@@ -183,7 +183,7 @@ def joint_law(joint: Port, effects: Sequence[Effect]) -> JointLaw:
     ModelError
         When an effect needs more than a force at the joint, such as equations of its own.
     """
-    compiled = lone_joint(joint)
+    compiled = equations(ports=(joint,))
     for effect in effects:
         attached = effect.attach(compiled)
         if len(attached.laws) != len(compiled.laws) + 1 or attached.states != compiled.states:
@@ -199,35 +199,26 @@ def wire(terminals: Sequence[Terminal], kind: str) -> CompiledModel:
     names = tuple(Terminal(name=each.name, unit=each.unit) for each in terminals)
     # Sites are told by name alone, so the other side's names must be no sites.
     hidden = tuple(Terminal(name=f"/{each.name}", unit=each.unit) for each in terminals)
-    count = len(names)
-    return _equations(
-        d=np.eye(count),
-        inputs=names if kind == "input" else hidden,
-        outputs=hidden if kind == "input" else names,
-        ports=(),
-    )
+    through = np.eye(len(names))
+    if kind == "input":
+        return equations(inputs=names, outputs=hidden, through=through)
+    return equations(inputs=hidden, outputs=names, through=through)
 
 
-def lone_joint(joint: Port) -> CompiledModel:
-    """Give equations that hold nothing but one joint."""
-    return _equations(d=np.zeros((0, 0)), inputs=(), outputs=(), ports=(joint,))
-
-
-def unconnected(inputs: Sequence[Terminal], outputs: Sequence[Terminal], joints: Sequence[Port]) -> CompiledModel:
-    """Give equations that hold inputs, outputs and joints, and no way from one to the other."""
-    d = np.zeros((len(outputs), len(inputs)))
-    return _equations(d=d, inputs=tuple(inputs), outputs=tuple(outputs), ports=tuple(joints))
-
-
-def _equations(
-    *, d: Real, inputs: tuple[Terminal, ...], outputs: tuple[Terminal, ...], ports: tuple[Port, ...]
+def equations(
+    *,
+    inputs: Sequence[Terminal] = (),
+    outputs: Sequence[Terminal] = (),
+    ports: Sequence[Port] = (),
+    through: Real | None = None,
 ) -> CompiledModel:
+    """Give equations without states: ``through [output, input]`` passes at once, nothing by default."""
     columns, rows, count = len(inputs), len(outputs), len(ports)
     return CompiledModel(
         a=np.zeros((0, 0)),
         b=np.zeros((0, columns)),
         c=np.zeros((rows, 0)),
-        d=d,
+        d=np.zeros((rows, columns)) if through is None else through,
         g=np.zeros((0, count)),
         h=np.zeros((rows, count)),
         displacement_state=np.zeros((count, 0)),
@@ -236,8 +227,8 @@ def _equations(
         velocity_state=np.zeros((count, 0)),
         velocity_column=np.zeros((count, columns)),
         velocity_port=np.zeros((count, count)),
-        inputs=inputs,
-        outputs=outputs,
+        inputs=tuple(inputs),
+        outputs=tuple(outputs),
         states=(),
-        ports=ports,
+        ports=tuple(ports),
     )

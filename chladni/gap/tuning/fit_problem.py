@@ -13,7 +13,7 @@ from chladni.gap.tuning.effect_scale import EffectNumber, with_numbers
 from chladni.gap.tuning.residual import Residual, Whitening, likelihood_cost, weights
 from chladni.models.effects.attached_effect import AttachedEffect
 from chladni.models.integrator.integrator import Integrator
-from chladni.signals.arrays import Mask, Real
+from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
 
 
@@ -74,7 +74,6 @@ class FitProblem:
         self,
         run: FreeRun,
         whitening: Whitening,
-        training: Mask,
         *,
         effects: Sequence[AttachedEffect],
         numbers: Sequence[EffectNumber],
@@ -83,7 +82,7 @@ class FitProblem:
         held: bool = True,
         start_z: Real,
     ) -> None:
-        self.run, self.whitening, self.training = run, whitening, training
+        self.run, self.whitening, self.training = run, whitening, whitening.training
         self.effects, self.numbers = tuple(effects), tuple(numbers)
         self.tuned = len(run.tunables.names) if tune else 0
         self.start_z = start_z

@@ -43,7 +43,7 @@ class Whitening:
     def __init__(self, noise: NoiseFloor, training: Mask, *, offsets: bool) -> None:
         if not training.any():
             raise EstimateError("no sample is left to fit on; give at least some as training")
-        self._noise = noise
+        self._noise, self.training = noise, training
         self._places = np.flatnonzero(training)
         self.samples = int(self._places.size)
         self._whole = bool(training.all())

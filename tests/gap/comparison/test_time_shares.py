@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from chladni.gap.calibration import LISTED
-from chladni.gap.comparison.time_shares import time_shares
+from chladni.gap.comparison.shares import time_shares
 
 RATE_HZ, SAMPLES = 200.0, 12800
 PIECE_S = SAMPLES / 64 / RATE_HZ

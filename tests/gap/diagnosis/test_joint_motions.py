@@ -8,7 +8,7 @@ import pytest
 
 from chladni.gap.comparison.log_regimes import amplitude
 from chladni.gap.comparison.shares import regime_shares
-from chladni.gap.diagnosis.joint_motions import joint_motions
+from chladni.gap.diagnosis.diagnose import joint_motions
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.places import Site
 from chladni.models.effects.attached_effect import attached

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chladni.gap.plant.driven_part import driven_parts
+from chladni.gap.diagnosis.advice import driven_parts
 from chladni.gap.plant.free_run import FreeRun
 from chladni.models.effects.attached_effect import attached
 from tests.gap.made_log import band_noise, chain, measured

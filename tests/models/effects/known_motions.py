@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from chladni.gap.simulators.wrapped_simulator import lone_joint
+from chladni.gap.simulators.wrapped_simulator import equations
 from chladni.models.core.port import Port
 from chladni.models.effects.trial import TrialMotion
 
@@ -12,7 +12,8 @@ RATE_HZ, SAMPLES = 1000.0, 4000
 def along(kind, signal, *, force=None, compiled=None, name="s", outputs=None) -> TrialMotion:
     """What is known of a motion, or of a signal, at a site."""
     return TrialMotion(
-        name=name, kind=kind, compiled=compiled if compiled is not None else lone_joint(Port(name="j", kind="joint")),
+        name=name, kind=kind,
+        compiled=compiled if compiled is not None else equations(ports=(Port(name="j", kind="joint"),)),
         force=np.zeros_like(signal) if force is None else force,
         displacement=signal, velocity=np.gradient(signal) * RATE_HZ, sample_rate_hz=RATE_HZ,
         frequency_hz=np.fft.rfftfreq(signal.size, 1 / RATE_HZ)[1:], believed=np.ones(signal.size // 2),
@@ -41,4 +42,4 @@ def weighed(trials, motion, force):
 def along_joint(displacement, *, stiffness=0.0, force=None) -> TrialMotion:
     """What is known of a joint that moves so."""
     joint = Port(name="j", kind="joint", stiffness=stiffness)
-    return along("joint", displacement, force=force, compiled=lone_joint(joint), name="j")
+    return along("joint", displacement, force=force, compiled=equations(ports=(joint,)), name="j")
