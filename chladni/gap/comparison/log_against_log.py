@@ -7,10 +7,10 @@ import numpy as np
 
 from chladni.gap.calibration import NOTICED, UNNOTICED
 from chladni.gap.comparison.distortion import Distortion, distortion_where_told
-from chladni.gap.comparison.log_regimes import log_regimes
+from chladni.gap.comparison.log_regimes import measured_variables
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.comparison.periodicity import with_period
-from chladni.gap.comparison.shares import band_shares, channel_gaps, gap_map, pooled_gap, time_shares
+from chladni.gap.comparison.shares import gap_map, pooled_gap, where_of
 from chladni.gap.records.diagnosis import Where
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
@@ -84,13 +84,7 @@ def compare_logs(measured: Measurement, simulated: Measurement) -> GapView:
     return GapView(
         residual=residual,
         gap=pooled_gap(residual, outputs),
-        where=Where(
-            channels=channel_gaps(residual, outputs, noise, output_names=ours.output_names),
-            bands=band_shares(residual, outputs, sample_rate_hz=rate_hz, noise=noise),
-            sites=(),
-            regimes=log_regimes(residual, ours),
-            times=time_shares(residual, outputs, sample_rate_hz=rate_hz),
-        ),
+        where=where_of(residual, ours, noise, measured_variables(ours)),
         noise=noise,
         map_time_s=map_time_s,
         map_frequency_hz=map_frequency_hz,

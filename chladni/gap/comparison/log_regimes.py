@@ -7,38 +7,26 @@ import numpy as np
 from scipy import fft
 
 from chladni.gap.calibration import CYCLES
-from chladni.gap.comparison.shares import Variable, regime_shares
-from chladni.gap.records.diagnosis import RegimeShare
+from chladni.gap.comparison.shares import Variable
 from chladni.gap.records.measurement import Measurement
 from chladni.signals.arrays import Real
 
 MOTION_UNITS = frozenset({"m", "rad", "m/s", "rad/s"})
 
 
-def log_regimes(residual: Real, measured: Measurement) -> tuple[RegimeShare, ...]:
-    """Find the regimes in which the gap is larger than elsewhere, and by more than the motion itself.
+def measured_variables(measured: Measurement) -> dict[str, Variable]:
+    """Give its outputs in m, rad, m/s and rad/s by their names, and the amplitude of every output.
 
-    A gap that is the same share of each output at any time grows with the motion, so that large amplitudes would
-    always be told. A regime is told when it holds 1.25 times as large a share of the gap's power as of time
-    (`regime_shares`), and 1.5 times what it would hold of that gap of constant shares.
-
-    Parameters
-    ----------
-    residual
-        ``[output, sample]``.
-    measured
-        Its outputs in m, rad, m/s and rad/s are variables by their names; the amplitude of every output is one, as
-        ``amplitude of wrist``, see `amplitude`, over four cycles of its mean frequency.
+    That is ``amplitude of wrist``, see `amplitude`, over four cycles of its mean frequency.
     """
     rows = list(zip(measured.output_names, measured.output_units, measured.outputs, strict=True))
     motions = {name: Variable(row, unit) for name, unit, row in rows if unit in MOTION_UNITS}
-    amplitudes = {
+    return motions | {
         f"amplitude of {name}": Variable(
             amplitude(row, cycles_of(row, measured.sample_rate_hz)), "" if unit == "1" else unit
         )
         for name, unit, row in rows
     }
-    return regime_shares(residual, measured.outputs, motions | amplitudes, beyond_motion=True)
 
 
 def cycles_of(signal: Real, sample_rate_hz: float) -> int:

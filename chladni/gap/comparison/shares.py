@@ -27,7 +27,8 @@ from chladni.gap.calibration import (
     SLIGHT,
     SOME,
 )
-from chladni.gap.records.diagnosis import BandShare, ChannelGap, RegimeShare, TimeShare
+from chladni.gap.records.diagnosis import BandShare, ChannelGap, RegimeShare, TimeShare, Where
+from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError
@@ -60,6 +61,22 @@ def _scale(measured: Real) -> Real:
 def pooled_gap(residual: Real, measured: Real) -> float:
     """RMS of the residual over the RMS of what was measured, all outputs pooled after scaling each by its own."""
     return float(np.sqrt(np.mean(relative_residual(residual, measured) ** 2)))
+
+
+def where_of(residual: Real, measurement: Measurement, noise: NoiseFloor, variables: Mapping[str, Variable]) -> Where:
+    """Say where and when a gap ``[output, sample]`` lies, but for sites, which are a model's.
+
+    A regime of the variables is told when it holds 1.25 times as large a share of the gap's power as of time, and 1.5
+    times what it would hold of a gap that is the same share of each output at any time, see `regime_shares`.
+    """
+    measured, rate_hz = measurement.outputs, measurement.sample_rate_hz
+    return Where(
+        channels=channel_gaps(residual, measured, noise, output_names=measurement.output_names),
+        bands=band_shares(residual, measured, sample_rate_hz=rate_hz, noise=noise),
+        sites=(),
+        regimes=regime_shares(residual, measured, variables, beyond_motion=True),
+        times=time_shares(residual, measured, sample_rate_hz=rate_hz),
+    )
 
 
 def channel_gaps(

@@ -11,6 +11,7 @@ from chladni.signals.arrays import Mask
 from chladni.signals.errors import LogError
 from chladni.signals.time_series import TimeSeries
 from chladni.signals.wording import counted
+from chladni.spectral.filters import channel_runs
 
 # Times to cut at are told to a tenth of a millisecond.
 _TOLD_HZ = 1e4
@@ -79,13 +80,7 @@ def whole_stretch(
 
 
 def _longest(good: Mask) -> slice:
-    # Stretches begin where good samples do, and end where they end.
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
-    firsts, lasts = edges[::2], edges[1::2]
-    if not firsts.size:
-        return slice(0, 0)
-    longest = int(np.argmax(lasts - firsts))
-    return slice(int(firsts[longest]), int(lasts[longest]))
+    return slice(*max(channel_runs(good), key=lambda run: run[1] - run[0], default=(0, 0)))
 
 
 def _too_little(

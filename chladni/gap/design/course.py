@@ -87,19 +87,16 @@ class Course:
         rows, gain = list(chosen), float(self.experiment.repeats)
         wanted = self.predictions[pair[0]].outputs
         power = np.mean(noise.whitened(wanted)[rows] ** 2, axis=-1)
-        sums = self._sums(noise, pair) if at is None else self._sums_at(noise, pair, at)
+        sums = self._sums(noise, pair, at)
         return Part(gain * sums[:, rows], ALONE + gain * detail[rows] * power, wanted.shape[-1])
 
-    def _sums(self, noise: NoiseFloor, pair: tuple[int, int]) -> Real:
+    def _sums(self, noise: NoiseFloor, pair: tuple[int, int], at: Real | None) -> Real:
+        wanted, rival = self.predictions[pair[0]].outputs, self._rivals[pair[1]]
+        if at is not None:
+            return sums_of(wanted, rival.predicted(self._run, self._initial(rival), at), noise, self._run.windows)
         if pair not in self._kept:
-            wanted, prediction = (self.predictions[one] for one in pair)
-            self._kept[pair] = sums_of(wanted.outputs, prediction, noise, self._run.windows)
+            self._kept[pair] = sums_of(wanted, self.predictions[pair[1]], noise, self._run.windows)
         return self._kept[pair]
-
-    def _sums_at(self, noise: NoiseFloor, pair: tuple[int, int], at: Real) -> Real:
-        rival = self._rivals[pair[1]]
-        prediction = rival.predicted(self._run, self._initial(rival), at)
-        return sums_of(self.predictions[pair[0]].outputs, prediction, noise, self._run.windows)
 
     def _initial(self, rival: Rival) -> Real:
         # Of a long log only the first windows are simulated.

@@ -13,6 +13,7 @@ from chladni.gap.records.diagnosis import Closing, HeldOut
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.signals.arrays import Mask, Real
+from chladni.spectral.filters import channel_runs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,15 +26,31 @@ class Yardstick:
         ``[sample]`` that no fit saw.
     noise
         The floor, as far as what is believed leaves it.
-    by, horizon_s
-        See `Closing`.
+    windows
+        ``(start, stop)`` samples, None in free run.
+    across_sensors
+        Whether each sensor is predicted from the others.
     """
 
     measurement: Measurement
     held: Mask
     noise: NoiseFloor
-    by: Literal["free_run", "windows", "cross_sensor"]
-    horizon_s: float | None
+    windows: Sequence[tuple[int, int]] | None
+    across_sensors: bool = False
+
+    @property
+    def by(self) -> Literal["free_run", "windows", "cross_sensor"]:
+        """See `Closing`."""
+        if self.across_sensors:
+            return "cross_sensor"
+        return "free_run" if self.windows is None else "windows"
+
+    @property
+    def horizon_s(self) -> float | None:
+        """Length of a window, None in free run."""
+        if self.windows is None:
+            return None
+        return max(stop - start for start, stop in self.windows) / self.measurement.sample_rate_hz
 
     @property
     def floor(self) -> float:
@@ -106,7 +123,7 @@ def _interval(yardstick: Yardstick, before: Real, after: Real, seed: int) -> tup
     """95 % interval by drawing held-out blocks with replacement (Kuensch 1989)."""
     measured = yardstick.measurement.outputs
     size = np.maximum(np.mean(measured[:, yardstick.held] ** 2, axis=1, keepdims=True), ZERO)
-    blocks = [slice(start, stop) for start, stop in _runs(yardstick.held)]
+    blocks = [slice(start, stop) for start, stop in channel_runs(yardstick.held)]
     if len(blocks) < 3:
         return None
     with np.errstate(over="ignore", invalid="ignore"):
@@ -126,11 +143,6 @@ def _interval(yardstick: Yardstick, before: Real, after: Real, seed: int) -> tup
     return float(low), float(high)
 
 
-def _runs(held: Mask) -> Sequence[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(np.int8), [0]])))
-    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
-
-
 def _stretches(yardstick: Yardstick) -> list[HeldOut]:
     rate, log = yardstick.measurement.sample_rate_hz, yardstick.measurement.log
-    return [HeldOut(log=log, start_s=start / rate, end_s=stop / rate) for start, stop in _runs(yardstick.held)]
+    return [HeldOut(log=log, start_s=start / rate, end_s=stop / rate) for start, stop in channel_runs(yardstick.held)]

@@ -2,14 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
 
 from chladni.gap.calibration import COVERAGE
 from chladni.gap.comparison.distortion import distortion_where_told
 from chladni.gap.comparison.levels import compare_levels
 from chladni.gap.comparison.log_regimes import amplitude
 from chladni.gap.comparison.periodicity import with_period
-from chladni.gap.comparison.shares import Variable, band_shares, channel_gaps, gap_map, regime_shares, time_shares
+from chladni.gap.comparison.shares import Variable, gap_map, where_of
 from chladni.gap.diagnosis.advice import advice_on, measure_next
 from chladni.gap.diagnosis.closing import Yardstick, closing_of
 from chladni.gap.diagnosis.evidence import any_law, evidence
@@ -112,7 +111,14 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
     motion = recoveries[0] if recoveries else None
     distortion = distortion_where_told(study.measurement)
     motions = joint_motions(study, shown.fit, motion)
-    gap = closing_of(_yardstick(study, causes), before, causes.tuned.fit.outputs, after, seed=seed)
+    yardstick = Yardstick(
+        measurement=study.measurement,
+        held=study.held,
+        noise=causes.noise,
+        windows=study.windows,
+        across_sensors=causes.shaken is not None,
+    )
+    gap = closing_of(yardstick, before, causes.tuned.fit.outputs, after, seed=seed)
     return Diagnosis(
         model=study.model.name,
         logs=tuple(logs),
@@ -138,19 +144,6 @@ def _assembled(study: Study, causes: Causes, logs: Sequence[str], seed: int) -> 
     )
 
 
-def _yardstick(study: Study, causes: Causes) -> Yardstick:
-    by: Literal["free_run", "windows", "cross_sensor"] = "free_run" if study.windows is None else "windows"
-    if causes.shaken is not None:
-        by = "cross_sensor"
-    return Yardstick(
-        measurement=study.measurement,
-        held=study.held,
-        noise=causes.noise,
-        by=by,
-        horizon_s=study.horizon_s,
-    )
-
-
 def _nominal(study: Study) -> Real:
     """Free run of the nominal model from the initial state that suits it best."""
     run, contest = study.contest.run, study.contest
@@ -161,18 +154,8 @@ def _nominal(study: Study) -> Real:
 
 
 def _where(study: Study, causes: Causes, simulated: Real, motions: Mapping[str, Variable]) -> Where:
-    measurement = study.measurement
-    residual = measurement.outputs - simulated
-    return Where(
-        channels=channel_gaps(residual, measurement.outputs, causes.noise, output_names=measurement.output_names),
-        bands=band_shares(
-            residual, measurement.outputs, sample_rate_hz=measurement.sample_rate_hz, noise=causes.noise
-        ),
-        sites=_sites(study.location),
-        regimes=regime_shares(residual, measurement.outputs, motions, beyond_motion=True),
-        times=time_shares(residual, measurement.outputs, sample_rate_hz=measurement.sample_rate_hz),
-        pair=_pair(study.location, causes.forces),
-    )
+    found = where_of(study.measurement.outputs - simulated, study.measurement, causes.noise, motions)
+    return replace(found, sites=_sites(study.location), pair=_pair(study.location, causes.forces))
 
 
 def _sites(location: Location) -> tuple[SiteShare, ...]:

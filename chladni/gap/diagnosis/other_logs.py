@@ -50,14 +50,7 @@ def closing_elsewhere(study: Study, causes: Causes, measurement: Measurement, *,
     run, noise = FreeRun(study.model, measurement, windows=windows), floor_of(measurement)
     training = training_of(measurement, windows)
     believed = causes.best if causes.verdict in ("effect", "parameters") else causes.tuned
-    horizon = None if windows is None else max(stop - start for start, stop in windows) / measurement.sample_rate_hz
-    yardstick = Yardstick(
-        measurement=measurement,
-        held=~training,
-        noise=noise,
-        by="free_run" if windows is None else "windows",
-        horizon_s=horizon,
-    )
+    yardstick = Yardstick(measurement=measurement, held=~training, noise=noise, windows=windows)
     try:
         runs = [_as_told(run, noise, training, one) for one in (None, causes.tuned, believed)]
     except (ModelError, EstimateError):

@@ -97,13 +97,6 @@ class Study:
         """Whether an effect is one of those that are looked for."""
         return any(kind.name == word for kind in self.kinds)
 
-    @property
-    def horizon_s(self) -> float | None:
-        """Length of a window, None in free run."""
-        if self.windows is None:
-            return None
-        return max(stop - start for start, stop in self.windows) / self.measurement.sample_rate_hz
-
 
 def study_of(
     model: Model, measurement: Measurement, *, leave_out: frozenset[str], own: Mapping[str, EffectKind]

@@ -130,17 +130,14 @@ class FreeRun:
             starts = initial_states(initial, len(self.windows), len(compiled.states))
             found = self._linear.outputs(compiled, self.rows, self.windows, starts)
             return mapped_outputs(compiled, self.rows, found, rate)
-        marched = self._marched(compiled, initial)
+        marched = self.marched(compiled, initial)
         if marched is not None:
             return mapped_outputs(compiled, self.rows, marched.outputs, rate)
-        parts = [integration.outputs[self.rows] for _, integration in self._integrations(compiled, key, initial)]
+        parts = [one.outputs[self.rows] for one in self._integrations(compiled, key, initial)]
         return parts[0] if len(parts) == 1 else np.hstack(parts)
 
-    def marched(self, z: Real | None, effects: Sequence[AttachedEffect], initial: Real | None) -> Marched | None:
+    def marched(self, compiled: CompiledModel, initial: Real | None) -> Marched | None:
         """Windows of a model with laws, outputs before clocks and maps; None where `integrations` does it better."""
-        return self._marched(self.compiled(z, effects), initial)
-
-    def _marched(self, compiled: CompiledModel, initial: Real | None) -> Marched | None:
         rate = self.measurement.sample_rate_hz
         hold = hold_of(compiled, rate)
         # An integrator counts time from the start of its own window; a law may want the log's.
@@ -185,11 +182,10 @@ class FreeRun:
             motion = self.motion(z, effects, initial, site=site)
             return motion.displacement, motion.velocity
         compiled, runs = self.compiled(z, effects), self.integrations(z, effects, initial)
-        for row, port in enumerate(runs[0][1].ports):
+        for row, port in enumerate(runs[0].ports):
             if compiled.ports[port].name == site:
-                displacement = np.concatenate([integration.displacement[row] for _, integration in runs])
-                velocity = np.concatenate([integration.velocity[row] for _, integration in runs])
-                return displacement, velocity
+                displacement = np.concatenate([one.displacement[row] for one in runs])
+                return displacement, np.concatenate([one.velocity[row] for one in runs])
         raise ModelError(f"no law acts at {site!r}")
 
     def motions(
@@ -207,10 +203,10 @@ class FreeRun:
     ) -> list[PortMotion]:
         """Motions during a run; the force is 0 where no law acts."""
         compiled, runs = self.compiled(z, effects), self.integrations(z, effects, initial)
-        columns = [self._columns(compiled, window) for window, _ in runs]
+        columns = [self._columns(compiled, window) for window in self.windows]
         found = []
         for port in ports:
-            parts = [_port_motion(compiled, port, one, u) for (_, one), u in zip(runs, columns, strict=True)]
+            parts = [_port_motion(compiled, port, one, u) for one, u in zip(runs, columns, strict=True)]
             displacement, velocity, force = np.concatenate(parts, axis=1)
             name, kind = compiled.ports[port].name, compiled.ports[port].kind
             found.append(PortMotion(name=name, kind=kind, displacement=displacement, velocity=velocity, force=force))
@@ -218,13 +214,11 @@ class FreeRun:
 
     def integrations(
         self, z: Real | None, effects: Sequence[AttachedEffect], initial: Real | None
-    ) -> list[tuple[tuple[int, int], Integration]]:
-        """Give each window with its run; arguments and errors are those of `outputs`."""
+    ) -> list[Integration]:
+        """Give the run of each window; arguments and errors are those of `outputs`."""
         return self._integrations(self.compiled(z, effects), _key(z, effects), initial)
 
-    def _integrations(
-        self, compiled: CompiledModel, key: object, initial: Real | None
-    ) -> list[tuple[tuple[int, int], Integration]]:
+    def _integrations(self, compiled: CompiledModel, key: object, initial: Real | None) -> list[Integration]:
         # For this run alone: an integrator's tables grow while it runs.
         integrator = self._integrators.take(
             key, lambda: Integrator(compiled, self.measurement.sample_rate_hz, tolerance=self.tolerance)
@@ -232,7 +226,7 @@ class FreeRun:
         starts = initial_states(initial, len(self.windows), len(compiled.states))
         try:
             return [
-                (window, integrator.run(self.measurement.inputs[:, slice(*window)], initial=start))
+                integrator.run(self.measurement.inputs[:, slice(*window)], initial=start)
                 for window, start in zip(self.windows, starts, strict=True)
             ]
         finally:

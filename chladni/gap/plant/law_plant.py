@@ -52,12 +52,12 @@ def fine_run(run: FreeRun, setting: Setting, initial: Real) -> LawRunResult:
     """Run as `FreeRun` does."""
     compiled = run.compiled(setting.z, setting.effects)
     equation = run.equations(compiled, 1)
-    marched = run.marched(setting.z, setting.effects, initial)
+    marched = run.marched(compiled, initial)
     if marched is not None:
         pairs = zip(run.windows, marched.records, strict=True)
         records = tuple(_at_samples(equation, window, record) for window, record in pairs)
         return _read(run, setting, compiled, equation, marched.outputs, records)
-    made = [integration for _, integration in run.integrations(setting.z, setting.effects, initial)]
+    made = run.integrations(setting.z, setting.effects, initial)
     records = recorded(equation, run.windows, made)
     late = np.any(run.late_s(compiled))
     if not (compiled.output_maps or late):

@@ -17,31 +17,6 @@ def windows_for(model: Model, measurement: Measurement) -> tuple[tuple[int, int]
     A pole that is not damped within the record (a rigid-body motion, an integrator, one that grows) makes a free run
     depend on its start for ever: what is predicted then is a window, from an estimated initial state. It lasts three
     times the slowest of the model's other times, at most three times that in which a growing motion grows by e.
-
-    Examples
-    --------
-    A carriage of 95 kg with 300 N s/m on a free guide: three times 0.32 s.
-
-    >>> from chladni.models.structures.structure import Body, Joint, Structure
-    >>> from chladni.models.structures.structure_model import StructureModel
-    >>> from chladni.models.structures.structure_input import StructureInput
-    >>> from chladni.models.structures.structure_output import StructureOutput
-    >>> model = StructureModel(
-    ...     name="axis",
-    ...     structure=Structure(
-    ...         bodies=(Body(name="carriage", mass=95.0),),
-    ...         joints=(Joint(name="guide", between=("ground", "carriage"), stiffness=0.0, damping=300.0),),
-    ...     ),
-    ...     inputs=(StructureInput(name="motor", at="carriage"),),
-    ...     outputs=(StructureOutput(name="position", measures="displacement", at="carriage"),),
-    ... )
-    >>> log = Measurement(
-    ...     log="log", sample_rate_hz=1000.0, inputs=np.zeros((1, 10000)), outputs=np.zeros((1, 10000)),
-    ...     input_names=("motor",), output_names=("position",), output_units=("m",),
-    ... )
-    >>> windows = windows_for(model, log)
-    >>> len(windows), windows[0], windows[-1]
-    (11, (0, 909), (9091, 10000))
     """
     return short_windows(model, measurement) if _lasting(_poles(model), measurement.duration_s).any() else None
 

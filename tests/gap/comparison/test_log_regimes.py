@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chladni.gap.comparison.log_regimes import amplitude, cycles_of, log_regimes
+from chladni.gap.comparison.log_regimes import amplitude, cycles_of, measured_variables
+from chladni.gap.comparison.shares import regime_shares
+from chladni.gap.records.diagnosis import RegimeShare
 from chladni.gap.records.measurement import Measurement
 from tests.gap.comparison import made_measurements as made
 
@@ -18,6 +20,10 @@ def swelling() -> Measurement:
     sine = np.sin(2 * np.pi * 20.0 * t)
     swells = (1.5 - np.cos(2 * np.pi * 0.25 * t)) * sine
     return replace(made.measurement(sine, np.array([swells, sine])), output_units=("m", "1"))
+
+
+def log_regimes(residual: np.ndarray, measured: Measurement) -> tuple[RegimeShare, ...]:
+    return regime_shares(residual, measured.outputs, measured_variables(measured), beyond_motion=True)
 
 
 def test_the_amplitude_of_a_sine_is_its_own() -> None:
