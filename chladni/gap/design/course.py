@@ -110,14 +110,9 @@ Record = tuple[Course, tuple[int, ...]]
 
 @dataclass(frozen=True, slots=True)
 class Separation:
-    """How far apart candidates are.
+    """How far apart candidates are, the first and each other one.
 
-    Attributes
-    ----------
-    rivals
-        The first is compared with each other one.
-    detail
-        ``[output]`` share of an output's power that even the right law would leave.
+    `detail` is the ``[output]`` share of an output's power that even the right law would leave.
     """
 
     rivals: Sequence[Rival]

@@ -31,12 +31,8 @@ def more_sensors(
 ) -> tuple[StructureOutput, ...]:
     """Give accelerometers at bodies without one, encoders and force sensors at suspected joints.
 
-    Parameters
-    ----------
-    measurement
-        Outputs that it doesn't hold are sensors that aren't there.
-    suspects
-        Names of sites. A sensor that is suspected itself doesn't count: a second one beside it may tell.
+    Outputs that the measurement doesn't hold are sensors that aren't there. Suspects are names of sites: a sensor
+    that is suspected itself doesn't count, since a second one beside it may tell.
     """
     if not isinstance(model, StructureModel):
         return ()

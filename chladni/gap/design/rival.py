@@ -105,14 +105,9 @@ class Rival:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One record that is imitated.
+    """One record that is imitated: ``sums [window, output, column, column]``, see `sums_of`, and its samples.
 
-    Attributes
-    ----------
-    sums
-        ``[window, output, column, column]`` of products, see `sums_of`.
-    scale
-        ``[output]`` mean square of the whitened residual that isn't held against a candidate.
+    `scale` is the ``[output]`` mean square of the whitened residual that isn't held against a candidate.
     """
 
     sums: Real

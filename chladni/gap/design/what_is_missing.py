@@ -86,10 +86,7 @@ def sensor_missing(
 ) -> str | None:
     """Ask for the sensor that splits the likeliest sites best, None when those there are do, or none would.
 
-    Parameters
-    ----------
-    model, measurement, noise, sites
-        As `what_is_missing` takes them.
+    Sites are as `what_is_missing` takes them.
     """
     sensors = more_sensors(model, measurement, sites)
     if not sensors or not measurement.output_names:

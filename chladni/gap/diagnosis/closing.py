@@ -80,12 +80,7 @@ class Yardstick:
 def explained_power(left: float, tuned: float, after: float, *, noise: float) -> float:
     """Give the share of the power that tuning leaves beyond the noise that a cause explains, 0 to 1.
 
-    Parameters
-    ----------
-    left
-        Gap with all causes but this one.
-    tuned, after, noise
-        Gap with none of them, more than `noise`; with all; the floor.
+    Gaps are `left` with all causes but this one, `tuned` with none of them, more than `noise`, and `after` with all.
     """
     # A cause is never worth more than all of them: without it the others may be left out, too.
     whole, back = tuned**2 - noise**2, min(left, tuned) ** 2 - after**2
@@ -93,14 +88,10 @@ def explained_power(left: float, tuned: float, after: float, *, noise: float) ->
 
 
 def closing_of(yardstick: Yardstick, before: Real, tuned: Real, after: Real, *, seed: int) -> Closing:
-    """Compare three simulations with the measurement on held-out samples.
+    """Compare three simulations ``[output, sample]`` with the measurement on held-out samples.
 
-    Parameters
-    ----------
-    before, tuned, after
-        ``[output, sample]`` of the nominal model, with best parameters, with parameters and effects.
-    seed
-        Of the bootstrap over blocks.
+    They're those of the nominal model, with best parameters, and with parameters and effects; the seed is the
+    bootstrap's.
     """
     measured, held = yardstick.measurement.outputs, yardstick.held
     gaps = [held_gap(measured, one, held) for one in (before, tuned, after)]

@@ -240,13 +240,8 @@ def _signals(study: Study, causes: Causes, before: Real, after: Real) -> GapSign
 def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) -> dict[str, Variable]:
     """Give displacement, velocity and amplitude of every joint, by names such as ``elbow.velocity``.
 
-    They're those of a fitted model's run, but at the site whose motion was recovered: the sensors tell that without
-    any law. A run that diverges tells nothing, and a joint whose motion can't be told is left out.
-
-    Parameters
-    ----------
-    fit
-        Of the model whose run is believed.
+    They're those of the run of the fit that is believed, but at the site whose motion was recovered: the sensors tell
+    that without any law. A run that diverges tells nothing, and a joint whose motion can't be told is left out.
     """
     moved = _of_run(study, fit)
     if known is not None and known.site.kind == "joint":

@@ -46,12 +46,8 @@ def is_lost_beside(located: Located | None, left: float) -> bool:
 def followed(study: Study, located: Located | None, hypotheses: Sequence[Hypothesis]) -> Entered | None:
     """Enter the hypotheses that follow the log over short windows, from there; None when none does.
 
-    Where unknown forces explain far more than any named one, its run may have gone another way than the log's.
-
-    Parameters
-    ----------
-    located
-        Whose forces tell the states at which windows begin: a place, or two.
+    Where unknown forces explain far more than any named one, its run may have gone another way than the log's. Those
+    of the place, or two, that are given tell the states at which windows begin.
     """
     states = recovered_states(study.location.problem, located)
     if states is None:

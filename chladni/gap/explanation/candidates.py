@@ -27,10 +27,7 @@ def screened(
 ) -> list[Screened]:
     """Weigh every effect at the sites of some places; the best of each form, by rising cost.
 
-    Parameters
-    ----------
-    known
-        What was taken from the log before it was located, when another effect is known already.
+    What is known was taken from the log before it was located, when another effect is known already.
     """
     places = list(places)
     return searched(places, forms_at(location, places, kinds, known))

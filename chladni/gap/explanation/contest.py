@@ -37,14 +37,9 @@ def training_mask(samples: int, sample_rate_hz: float, period_samples: int | Non
 
 
 class Contest:
-    """Fits hypotheses to one log.
+    """Fits hypotheses to one log, on the samples that `training` marks.
 
-    Parameters
-    ----------
-    training
-        ``[sample]`` what fits may see.
-    states
-        Those that windows begin their search at; without them each begins at what its linear part alone would.
+    Windows begin their search at `states`; without them each begins at what its linear part alone would.
     """
 
     def __init__(

@@ -23,12 +23,8 @@ from chladni.signals.value import Value
 class KnownEffect(Value):
     """Taken from a log, the rest is a gap of a linear model again; but laws act along the whole motion.
 
-    Attributes
-    ----------
-    outputs
-        ``[output, sample]`` beyond those of the linear model at the same parameters.
-    displacement, velocity
-        ``[sample]`` of ports likewise, by name and kind.
+    ``outputs [output, sample]`` are those beyond the linear model's at the same parameters, displacement and velocity
+    ``[sample]`` likewise those of ports, by name and kind.
     """
 
     outputs: Real
@@ -124,13 +120,7 @@ def _only_laws(run: FreeRun, effects: tuple[AttachedEffect, ...]) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class KnownStates(Value):
-    """States of a whole record.
-
-    Attributes
-    ----------
-    values
-        ``[state, sample]``, but for their means, which no accelerometer tells.
-    """
+    """States of a whole record: ``values [state, sample]``, but for their means, which no accelerometer tells."""
 
     names: tuple[str, ...]
     values: Real

@@ -135,10 +135,7 @@ class Regression:
     def solved(self, basis: Real, rest: Real | None = None) -> tuple[Real, float, Real]:
         """Give the amplitudes of ``[column, number]``, the misfit that they leave, and the parameters with them.
 
-        Parameters
-        ----------
-        rest
-            ``[number]`` by default that of the regression.
+        The rest ``[number]`` is by default that of the regression.
         """
         rest = self.rest if rest is None else rest
         size = np.linalg.norm(basis, axis=1)

@@ -44,15 +44,7 @@ class Shot:
 
 
 class Shooting:
-    """Fits over windows that grow, on one log.
-
-    Parameters
-    ----------
-    contest
-        Whose windows, or whole run, are grown to.
-    states
-        That the machine went through.
-    """
+    """Fits over windows that grow to those of a contest, from states that the machine went through."""
 
     def __init__(self, contest: Contest, states: KnownStates) -> None:
         self.contest, self.states = contest, states

@@ -17,13 +17,7 @@ from chladni.models.effects.trial import Trial, TrialMotion
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SiteTrial:
-    """One form of an effect at one site.
-
-    Attributes
-    ----------
-    kind
-        The effect; None of a law that has no name.
-    """
+    """One form of an effect at one site; `kind` is None of a law that has no name."""
 
     kind: EffectKind | None = None
     site: Site

@@ -43,15 +43,7 @@ from chladni.signals.arrays import Real
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Located:
-    """One place (or a pair) with the profile of the whole record.
-
-    Attributes
-    ----------
-    places
-        One, or two that act together.
-    profile
-        On the record's lines.
-    """
+    """One place, or two that act together, with the profile on the whole record's lines."""
 
     places: tuple[Place, ...]
     profile: Profile
@@ -97,12 +89,8 @@ def locate(
     """Profile an unknown force at every place of a model.
 
     Parameters are refitted within their tolerance under each hypothesis, so that a tuning that swallowed part of an
-    effect can't mislead. With one sensor any force explains anything: then every place is handed on.
-
-    Parameters
-    ----------
-    start_z
-        ``[parameter]`` where the parameters are thought to be, zero without.
+    effect can't mislead; they begin at ``start_z [parameter]``, zero without. With one sensor any force explains
+    anything: then every place is handed on.
     """
     whole = LinearProblem(
         model, measurement, noise, tunables, all_lines(measurement.samples, measurement.sample_rate_hz)
@@ -171,12 +159,7 @@ def tuned_stepwise(
 ) -> Profile:
     """Fit the parameters on one problem after another, each starting where the one before ended, the last one finely.
 
-    Parameters
-    ----------
-    limit
-        See `profiled`.
-    sites
-        At which forces may be anything.
+    Forces at the sites may be anything meanwhile; the limit is that of `profiled`.
     """
     limit = problems[0].limits(z) if limit is None else limit
     for problem in problems[:-1]:
@@ -256,10 +239,7 @@ def _shares(tuned: Profile, rough: Sequence[Located]) -> dict[str, float]:
 def explained_share(without: float, chi: float) -> float:
     """Give the share of the misfit beyond noise that forces, or causes, explain, 0 to 1.
 
-    Parameters
-    ----------
-    without, chi
-        Mean squares over what noise alone leaves, without any and with them.
+    Both are mean squares over what noise alone leaves, without any of them and with them.
     """
     return float(np.clip((without - max(chi, 1.0)) / max(without - 1.0, RIDGE), 0.0, 1.0))
 

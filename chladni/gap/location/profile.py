@@ -63,10 +63,7 @@ class Profile:
 class Projection:
     """Takes from whitened spectra what forces of any shape at some sites can print.
 
-    Parameters
-    ----------
-    patterns
-        ``[output, 1, line]`` of each site.
+    Patterns are ``[output, 1, line]`` of each site.
     """
 
     def __init__(self, patterns: Sequence[Complex]) -> None:
@@ -91,15 +88,7 @@ class Projection:
 
 
 class Elimination(Projection):
-    """Takes from whitened spectra what forces of any shape at some sites, and transients, can print.
-
-    Parameters
-    ----------
-    patterns
-        ``[output, 1, line]`` of each site.
-    transients
-        ``[state, output, 1, line]``.
-    """
+    """Takes transients ``[state, output, 1, line]`` from whitened spectra, too; see `Projection`."""
 
     def __init__(self, patterns: Sequence[Complex], transients: Complex) -> None:
         super().__init__(patterns)

@@ -207,12 +207,8 @@ def _starts(view: View, measured: Complex, weight: Real) -> Real:
 def _transient(transients: Complex, weight: Complex, residual: Complex, start: Real) -> Real:
     """Best transients ``[state, 1]`` when forces and noise are random, by weighted least squares.
 
-    Parameters
-    ----------
-    weight
-        ``[line, output, output]`` inverse covariance of forces and noise together.
-    start
-        ``[state, state]`` inverse covariance of the transients.
+    The weight is the ``[line, output, output]`` inverse covariance of forces and noise together, `start` that of the
+    transients, ``[state, state]``.
     """
     weighted = np.einsum("aol,lop->apl", transients.conj(), weight, optimize=True)
     # Lines are complex, of unit variance: twice the sums are those of real numbers.

@@ -9,13 +9,7 @@ MadeT = TypeVar("MadeT")
 
 
 class Kept(Generic[MadeT]):
-    """Keeps what was asked for last.
-
-    Parameters
-    ----------
-    most
-        Number of things; the one that nobody asked for longest goes first.
-    """
+    """Keeps what was asked for last: at most so many things, the one that nobody asked for longest goes first."""
 
     def __init__(self, most: int) -> None:
         self._most, self._made, self._lock = most, OrderedDict[Hashable, MadeT](), Lock()

@@ -14,12 +14,9 @@ from chladni.signals.errors import ModelError
 
 
 class LaidInputs:
-    """Rows of steps, see `Hold`. Most effects and all parameters leave the inputs as they are.
+    """Rows of steps, see `Hold`, of ``signals [input, sample]`` of a whole record.
 
-    Parameters
-    ----------
-    signals
-        ``[input, sample]`` of the whole record.
+    Most effects and all parameters leave the inputs as they are.
     """
 
     def __init__(self, signals: Real, sample_rate_hz: float) -> None:

@@ -27,10 +27,7 @@ _AT_ONCE = SPARE_BYTES // 64
 class LinearProblem:
     """One measurement, one model, some lines; linearised wherever it's asked for.
 
-    Parameters
-    ----------
-    neighbours
-        Equations that problems of one model share.
+    Problems of one model share the equations of its neighbours.
     """
 
     def __init__(
@@ -166,10 +163,7 @@ Make = Callable[[Values, Real], CompiledModel]
 def with_further(problem: LinearProblem, count: int, make: Make) -> LinearProblem:
     """Give the problem with `count` further numbers behind its parameters in z, in the steps that `make` takes.
 
-    Parameters
-    ----------
-    make
-        Gives the equations, with all of the model's states in front; numbers of zero may mean anything.
+    That gives the equations, with all of the model's states in front; numbers of zero may mean anything.
     """
     names = tuple(f"further {place}" for place in range(count))
     numbers = _Numbers(tunables=problem.tunables, further=names)

@@ -35,10 +35,7 @@ class Place:
 def sites_of(compiled: CompiledModel, outputs: Sequence[str]) -> tuple[Site, ...]:
     """Give every site of a model at which an effect of the vocabulary may act.
 
-    Parameters
-    ----------
-    outputs
-        Names of the measured ones: an error of a sensor that isn't in the log shows nowhere.
+    Outputs are the measured ones: an error of a sensor that isn't in the log shows nowhere.
     """
     kinds = ("joint", "body", "ground", "pair")
     ports = [Site(name=port.name, kind=port.kind) for port in compiled.ports if port.kind in kinds]
@@ -49,13 +46,7 @@ def sites_of(compiled: CompiledModel, outputs: Sequence[str]) -> tuple[Site, ...
 
 
 def way_to(view: View, site: Site, outputs: Sequence[str]) -> Way:
-    """Give how a force (change, error) at a site enters the equations.
-
-    Parameters
-    ----------
-    outputs
-        Names of the measured ones, in the order of the view.
-    """
+    """Give how a force (change, error) at a site enters the equations; outputs are the view's."""
     has_port = any((port.name, port.kind) == (site.name, site.kind) for port in view.compiled.ports)
     if site.kind == "output" and not has_port:
         return view.way_of_output(list(outputs).index(site.name))
@@ -67,10 +58,7 @@ def way_to(view: View, site: Site, outputs: Sequence[str]) -> Way:
 def printed_patterns(view: View, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> Complex:
     """``[site, output, line]`` that a force of one (a change of an input, an error) at each site prints, over noise.
 
-    Parameters
-    ----------
-    outputs
-        Names of the view's outputs, which `noise` is of. One without noise counts nothing.
+    Outputs are the view's, which the noise is of; one without noise counts nothing.
     """
     density = noise.density(view.lines.cycles)
     # Of an output without noise nothing is known, such as a sensor to be added where the log's input moves nothing.
@@ -83,13 +71,10 @@ def printed_patterns(view: View, sites: Sequence[Site], outputs: Sequence[str], 
 
 
 def placed(view: View, sites: Sequence[Site], outputs: Sequence[str], noise: NoiseFloor) -> tuple[Place, ...]:
-    """Put together sites whose patterns are proportional on every line.
+    """Put together sites whose patterns are proportional on every line, see `printed_patterns`.
 
-    Parameters
-    ----------
-    outputs, noise
-        See `printed_patterns`. Held against its noise each sensor counts: a motor's current beside a displacement in
-        metres has a million times its numbers.
+    Held against its noise each sensor counts: a motor's current beside a displacement in metres has a million times
+    its numbers.
     """
     acting = [site for site in sites if not _is_motion(view.compiled, site)]
     found: list[tuple[list[Site], Complex]] = []

@@ -79,10 +79,7 @@ def segment_lines(segment: int, *, samples: int, sample_rate_hz: float, count: i
 def telling_lines(power: Real, *, samples: int, sample_rate_hz: float, count: int = LINES) -> RecordLines:
     """Choose about `count` lines: half where the power is highest, half spread evenly over the rest.
 
-    Parameters
-    ----------
-    power
-        ``[line]`` of `all_lines`, such as the residual's over the noise's.
+    The power ``[line]`` is of `all_lines`, such as the residual's over the noise's.
     """
     every = all_lines(samples, sample_rate_hz)
     if every.index.size <= count:

@@ -68,13 +68,7 @@ class Tunables(Value):
         return np.array([one in names for one in self.names], dtype=np.bool_)
 
     def values(self, z: Real) -> dict[str, float]:
-        """Value of each parameter by name, SI.
-
-        Parameters
-        ----------
-        z
-            ``[parameter]``, in sigmas of the tolerance.
-        """
+        """Value of each parameter by name, SI, at ``z [parameter]`` in sigmas of the tolerance."""
         require_shape("z", z, (len(self.names),), "the tunable parameters")
         numbers = self.nominal * np.exp(self.tolerance * z)
         return dict(zip(self.names, numbers.tolist(), strict=True))

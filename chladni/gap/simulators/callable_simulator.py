@@ -38,15 +38,7 @@ class SimulatorFunction(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CallableSimulator:
-    """Implements `Simulator`; made by `callable_simulator`.
-
-    Attributes
-    ----------
-    name, parameters, inputs, outputs, joints
-        See `Simulator`.
-    function
-        See `SimulatorFunction`.
-    """
+    """Implements `Simulator` by a `SimulatorFunction`; made by `callable_simulator`."""
 
     name: str
     parameters: Parameters

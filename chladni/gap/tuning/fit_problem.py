@@ -40,12 +40,8 @@ class Evaluation:
 class Slopes:
     """Least-squares equations around a point, initial states eliminated.
 
-    Attributes
-    ----------
-    curvature, gradient
-        ``[unknown, unknown]``, ``[unknown]`` of the cost.
-    back
-        For each window ``(constant [state], per unknown [state, unknown])``: step of its initial state.
+    ``curvature [unknown, unknown]`` and ``gradient [unknown]`` are those of the cost; `back` is for each window the
+    step of its initial state, ``(constant [state], per unknown [state, unknown])``.
     """
 
     curvature: Real
@@ -180,12 +176,8 @@ class FitProblem:
     def followed(self, here: Evaluation, slopes: Slopes) -> Real:
         """``[unknown, output, training sample]``: change of the whitened outputs with each unknown.
 
-        What a fit finds beside the unknowns, initial states and constants, follows them as it does there.
-
-        Parameters
-        ----------
-        slopes
-            At the same point.
+        What a fit finds beside the unknowns, initial states and constants, follows them as it does at the slopes'
+        point.
         """
         own, starts = self._columns(here)
         moved = self.whitening.seen(own)

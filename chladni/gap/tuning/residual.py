@@ -32,12 +32,7 @@ class Residual:
 class Whitening:
     """Whitens signals over the whole record, then keeps the training samples and takes constants out.
 
-    Parameters
-    ----------
-    training
-        ``[sample]``: what the fit may see.
-    offsets
-        Whether each output may have an unknown constant, which no dynamic model explains.
+    Each output may have an unknown constant, an offset, which no dynamic model explains.
     """
 
     def __init__(self, noise: NoiseFloor, training: Mask, *, offsets: bool) -> None:
