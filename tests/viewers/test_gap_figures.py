@@ -48,6 +48,20 @@ def test_signals_are_those_of_the_telling_stretch(figures: dict[str, Figure], ev
         assert axes.get_title(loc="left") == signals.output_names[row]
 
 
+def test_small_signals_and_errors_have_a_prefix_on_their_axes() -> None:
+    signals = made.signals()
+    small = replace(
+        signals, output_units=("m", "m"), measured=1e-5 * signals.measured, before=1e-5 * signals.before,
+        after=1e-5 * signals.after, noise_rms=1e-5 * signals.noise_rms,
+    )  # fmt: skip
+    drawn = gap_album(gap_evidence(replace(made.diagnosis(), signals=small))).figures
+    for name in ("signals", "errors"):
+        for axes in drawn[name].axes:
+            assert axes.get_ylabel() == "[µm]"
+            largest = max(float(np.nanmax(np.abs(line.get_ydata()))) for line in axes.lines)
+            assert 1.0 <= largest < 1000.0
+
+
 def test_errors_keep_their_extremes(figures: dict[str, Figure]) -> None:
     before = made.measured() - made.nominal_run().outputs.values
     for row, axes in enumerate(figures["errors"].axes):

@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chladni.gap.records.diagnosis import Diagnosis, GapSignals
-from chladni.signals.engineering import engineering
-from chladni.signals.unit_text import printed_unit
+from chladni.signals.engineering import axis_scale, engineering
 from chladni.viewers.drawing import thin, with_breaks
 from chladni.viewers.figures.panes import pages
 from chladni.viewers.figures.sheet import look, paint, plain, sheet
@@ -98,17 +97,18 @@ def draw_zoom(axes: Axes, signals: GapSignals, row: int, span_s: tuple[float, fl
     first, last = (int(np.searchsorted(signals.seconds, end - half_s)) for end in span_s)
     time_s = signals.seconds[first:last]
     starts = np.array([start - first for start in signals.window_starts if first < start < last], dtype=np.intp)
-    axes.plot(time_s, signals.measured[row, first:last], color=MEASURED, linewidth=2.6, label="measured")
+    scale, unit = axis_scale(signals.measured[row], signals.output_units[row])
+    axes.plot(time_s, signals.measured[row, first:last] / scale, color=MEASURED, linewidth=2.6, label="measured")
     # Each wider than what is drawn over it, so that none is hidden by one that follows it.
     lines = [(signals.before, BEFORE, 1.4, "simulated" if after is None else "simulated before")]
     if after is not None:
         lines.append((signals.after, AFTER, 0.8, after))
     for values, colour, width, label in lines:
         # A window begins at a state of its own: no line joins it to the one before.
-        x, y = with_breaks(time_s, values[row, first:last], starts)
+        x, y = with_breaks(time_s, values[row, first:last] / scale, starts)
         axes.plot(x, y, color=colour, linewidth=width, label=label)
     axes.set_xlim(time_s[0], time_s[-1])
-    axes.set_ylabel(f"[{plain(printed_unit(signals.output_units[row]))}]")
+    axes.set_ylabel(f"[{plain(unit)}]")
 
 
 def draw_errors(
@@ -128,11 +128,12 @@ def draw_errors(
     lines = [(signals.before, BEFORE, 0.9, "error" if after is None else "error before")]
     if after is not None:
         lines.append((signals.after, AFTER, 0.5, f"error {after}"))
+    scale, unit = axis_scale(measured - signals.before[row, first:last], signals.output_units[row])
     for simulated, colour, width, label in lines:
-        x, y = with_breaks(time_s, measured - simulated[row, first:last], starts)
+        x, y = with_breaks(time_s, (measured - simulated[row, first:last]) / scale, starts)
         chosen, _ = thin(y, limit=POINTS)
         axes.plot(x[chosen], y[chosen], color=colour, linewidth=width, label=label)
-    noise = float(signals.noise_rms[row])
+    noise = float(signals.noise_rms[row]) / scale
     axes.axhspan(-noise, noise, color="black", alpha=0.25, linewidth=0, zorder=4, label="noise")
     axes.set_xlim(*(span_s or signals.span_s))
-    axes.set_ylabel(f"[{plain(printed_unit(signals.output_units[row]))}]")
+    axes.set_ylabel(f"[{plain(unit)}]")
