@@ -62,7 +62,7 @@ def test_axes_say_quantity_and_unit(figures: dict[str, Figure]) -> None:
     assert {"Power spectral density [(m/s²)²/Hz]", "Frequency [Hz]"} <= texts(figures[PSD])
     shown = texts(figures[RESPONSE])
     assert {"Accelerance |H| [(m/s²)/N]\nH1, to hammer.x", "Coherence [1]", "12.5 Hz"} <= shown
-    assert "Phase [deg]\nH = Y/X, e^{+jωt}" in shown
+    assert "Phase [deg]\nH = Y/X, exp(+jωt)" in shown
     assert {"Acceleration [m/s²]", "Time [s]"} <= texts(figures["waveforms 1 Acceleration"])
     assert {"PSD [dB re 1 (m/s²)²/Hz]", "Time [s]"} <= texts(figures["waterfall 1 Acceleration"])
     assert {"Re H [(m/s²)/N]", "Im H [(m/s²)/N]"} <= texts(figures["nyquist 1 Acceleration"])

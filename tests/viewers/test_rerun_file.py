@@ -233,7 +233,7 @@ def test_blueprint_shows_every_part_and_chooses_nothing_by_itself(arm: Contents)
     assert "Acceleration [m/s²]" in names
     assert "Acceleration PSD [dB re 1 (m/s²)²/Hz] · 1 ms = 1 Hz" in names
     assert "Accelerance |H| to hammer.x [dB re 1 (m/s²)/N] · H1 · 1 ms = 1 Hz" in names
-    assert "Phase [deg] · H = Y/X, e^{+jωt}" in names
+    assert "Phase [deg] · H = Y/X, exp(+jωt)" in names
     # Findings, two groups of waveforms and densities, five plots of responses, three a channel.
     assert len(names) == 1 + 2 * 2 + 5 + 3 * 4
     flags = {key: row[key] for row in arm.blueprint for key in row if key.startswith("ViewportBlueprint:auto_")}

@@ -31,6 +31,7 @@ from chladni.signals.mode_set import ModeSet
 from chladni.signals.order_spread import OrderSpread
 from chladni.signals.provenance import Provenance
 from chladni.signals.stabilisation_diagram import StabilisationDiagram
+from chladni.signals.units import power_density_unit
 from chladni.spectral.blocks import Source
 from chladni.spectral.stretches import valid_runs
 
@@ -287,7 +288,7 @@ def _diagram(
         indicator_hz=decomposition.frequency_hz,
         indicator=decomposition.values.T,
         indicator_name="singular values of the cross-spectra",
-        indicator_unit=f"({units.pop()})^2/Hz" if len(units) == 1 else "1",
+        indicator_unit=power_density_unit(units.pop()) if len(units) == 1 else "1",
         limits=limits,
     )
 

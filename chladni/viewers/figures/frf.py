@@ -15,7 +15,7 @@ from chladni.viewers.figures.sheet import BAND_OPACITY, BANDS_OF, legend, look, 
 from chladni.viewers.panels import Panel, panels
 from chladni.viewers.style import Style
 
-CONVENTION = "H = Y/X, e^{+jωt}"
+CONVENTION = "H = Y/X, exp(+jωt)"
 HEIGHTS_IN = (2.5, 1.35, 1.1)
 # Room for the mark on the highest peak.
 MARK_DB = 2.0

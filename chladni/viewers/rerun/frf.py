@@ -53,7 +53,7 @@ def draw_phase(recording: rr.RecordingStream, panel: Panel, style: Style) -> rrb
         x, y = with_breaks(panel.frequency_hz(), phase, breaks)
         draw_line(recording, path, x, y, name=style.labels[channel.name], colour=style.on_dark(channel))
 
-    return _view(panel, "phase", "Phase [deg] · H = Y/X, e^{+jωt}", draw, limits=(-190.0, 190.0))
+    return _view(panel, "phase", "Phase [deg] · H = Y/X, exp(+jωt)", draw, limits=(-190.0, 190.0))
 
 
 def draw_coherence(recording: rr.RecordingStream, panel: Panel, style: Style) -> rrb.View:

@@ -258,6 +258,8 @@ def test_channels_of_two_units_need_no_scaling_by_hand():
     found = identify(mixed)
     np.testing.assert_allclose(found.frequency_hz, identify(record).frequency_hz, rtol=1e-6)
     assert found.stabilisation.indicator_unit == "1"
+    bare = replace(record, channels=tuple(replace(one, unit="1") for one in record.channels))
+    assert identify(bare).stabilisation.indicator_unit == "1/Hz"
 
 
 def test_impossible_requests_are_told():
