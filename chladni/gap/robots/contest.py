@@ -287,7 +287,7 @@ class Contest:
             place += count
         if inertia is not torques.inertia:
             joints = slice(len(torques.joints))
-            more = torques.reading_noise_at(inertia) - torques.reading_noise_at(torques.inertia)
+            more = torques.reading_noise_at(inertia) - torques.described_reading_noise
             found[joints] += more / torques.noise[joints] ** 2
         return found
 

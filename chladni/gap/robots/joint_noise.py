@@ -1,6 +1,7 @@
 """Noise of joint readings, and what it makes of torques."""
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from scipy.signal import welch
@@ -54,11 +55,17 @@ def torque_noise(density: Real, cutoff_hz: float, *, stiffness: Real, damping: R
     Of stiffness (the servos') and damping at the joints, and of the inertia ``[joint, joint, pose]`` by which each
     feels all of them: |k + i w d - w^2 m|^2 times the densities.
     """
-    omega = 2.0 * np.pi * np.linspace(0.0, cutoff_hz, _LINES)
-    squared, fourth = float(np.mean(omega**2)), float(np.mean(omega**4))
+    squared, fourth = _mean_powers(cutoff_hz)
     own = np.mean(np.diagonal(inertia), axis=0)
     gain = stiffness**2 + (damping**2 - 2.0 * stiffness * own) * squared
     return np.asarray((density * gain + fourth * np.mean(inertia**2, axis=2) @ density) * cutoff_hz)
+
+
+@cache
+def _mean_powers(cutoff_hz: float) -> tuple[float, float]:
+    """Mean w^2 and w^4 below a cutoff, rad/s."""
+    omega = 2.0 * np.pi * np.linspace(0.0, cutoff_hz, _LINES)
+    return float(np.mean(omega**2)), float(np.mean(omega**4))
 
 
 def imu_noise(force: float, turning: float, cutoff_hz: float, *, carried: Real, place: Real) -> Real:

@@ -369,17 +369,27 @@ class Torques(Motion):
         """``[row, coarse]``: what is missing beyond what was explained already."""
         return self.missing if self.explained is None else self.missing - self.explained
 
-    def reading_noise_at(self, inertia: Real) -> Real:
-        """Give ``[joint]``: variance of missing torque by readings, of an inertia ``[joint, joint, pose]``."""
+    @cached_property
+    def _held_by(self) -> tuple[Real, Real]:
+        """``[joint]`` of stiffness and of damping at the joints."""
         damping = np.array([one.damping for one in self.joints])
         by_position = not self.by_effort and self.log.command_kind == "position"
-        kp, kd = (one * by_position for one in (self.kp, self.kd))
-        return torque_noise(self._steps[1], self.cutoff_hz, stiffness=kp, damping=kd + damping, inertia=inertia)
+        return self.kp * by_position, self.kd * by_position + damping
+
+    def reading_noise_at(self, inertia: Real) -> Real:
+        """Give ``[joint]``: variance of missing torque by readings, of an inertia ``[joint, joint, pose]``."""
+        kp, kd = self._held_by
+        return torque_noise(self._steps[1], self.cutoff_hz, stiffness=kp, damping=kd, inertia=inertia)
+
+    @cached_property
+    def described_reading_noise(self) -> Real:
+        """``[joint]``: the same of the inertia as described; a search asks for it at every fit."""
+        return self.reading_noise_at(self.inertia)
 
     @cached_property
     def sensed_noise(self) -> Real:
         """``[row]``: standard deviation that the noise of sensors gives the missing torque, as described."""
-        found = self.reading_noise_at(self.inertia) + self._noise_of_base
+        found = self.described_reading_noise + self._noise_of_base
         if not self.by_effort:
             return np.sqrt(found)
         rate, stretches = self.log.sample_rate_hz, self.stretches
