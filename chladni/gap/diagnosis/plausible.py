@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from chladni.gap.calibration import FAR, NEAR, ONE_FORCE, SAME
+from chladni.gap.calibration import NEAR, ONE_FORCE, SAME
 from chladni.gap.diagnosis.following import is_lost_beside
 from chladni.gap.diagnosis.study import Study
 from chladni.gap.explanation.hypothesis import Contestant
@@ -46,12 +46,6 @@ def _least_chi(location: Location) -> float:
 def is_lost(location: Location, left: float) -> bool:
     """Whether what the best runs leave, over the noise's power, is far more than an unknown force does."""
     return is_lost_beside(location.best, left)
-
-
-def is_far(location: Location, left: float) -> bool:
-    """Whether runs leave far more than the best place does, a sensor's or an input's own as well as a force's."""
-    best = location.best
-    return best is None or left > FAR * max(best.profile.chi, 1.0)
 
 
 def least_left(found: Sequence[Contestant]) -> float:

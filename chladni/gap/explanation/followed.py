@@ -12,7 +12,7 @@ from chladni.signals.arrays import Real
 _Followed = tuple[Screened, Profile]
 
 
-def followed(screen: Screen, start: Screened, *, iterations: int = PROFILE_STEPS) -> tuple[Screened, Screen] | None:
+def followed(screen: Screen, start: Screened) -> tuple[Screened, Screen] | None:
     """Follow a trial by Gauss and Newton steps in the parameters; also give the screen where it ends.
 
     A free force hides what parameters should do: those of its place may lie many widths of a resonance from the right
@@ -29,7 +29,7 @@ def followed(screen: Screen, start: Screened, *, iterations: int = PROFILE_STEPS
         return None
     best = min(starts, key=lambda one: one[0].cost)
     there = _at(screen, best)
-    for _ in range(iterations):
+    for _ in range(PROFILE_STEPS):
         aim = there.weigh(start.trial, start.shape)
         found = None if aim is None else _searched(there, start, best, aim.z - best[0].z)
         if found is None:

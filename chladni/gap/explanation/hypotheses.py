@@ -23,21 +23,16 @@ from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 
-def effect_hypotheses(screened: Sequence[Screened], *, count: int, margin: float = UNLIKELY) -> list[Hypothesis]:
-    """Give the best screened trials as hypotheses.
+def effect_hypotheses(screened: Sequence[Screened], *, count: int) -> list[Hypothesis]:
+    """Give the best screened trials as hypotheses: so many, and a few that are as good as the last of them.
 
-    Parameters
-    ----------
-    count
-        So many and a few that are as good as the last of them, of each effect and site at most two forms.
-    margin
-        Trials whose misfit is so many times that of the best are left out.
+    Of each effect and site there are at most two forms.
     """
     found: list[Hypothesis] = []
     seen: dict[tuple[str, str], int] = {}
     if not screened:
         return found
-    enough, last = margin * min(one.chi for one in screened), 0.0
+    enough, last = UNLIKELY * min(one.chi for one in screened), 0.0
     for one in screened:
         key = (one.trial.effect, one.trial.site.name)
         if seen.get(key, 0) >= LEADS or one.chi > enough:

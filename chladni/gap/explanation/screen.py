@@ -203,10 +203,6 @@ class Screen:
         slopes = self._held.out.rest(problem.slopes(found.z, found.transient, forces))
         self._regression = Regression(self._held.rest, slopes, found.z, limit)
 
-    def nothing(self) -> float:
-        """Misfit and prior without any force."""
-        return self._regression.solved(np.zeros((0, self._held.rest.size)))[1]
-
     def run(self, trials: Iterable[SiteTrial]) -> list[Screened]:
         """Weigh trials on their grids; those whose amplitudes make no such effect are left out."""
 
