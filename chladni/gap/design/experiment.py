@@ -74,8 +74,6 @@ class Design:
     nats, now_nats
         Log evidence between the best candidate and the nearest of the others that is expected of a log like the one
         at hand and this measurement together, and of such a log alone.
-    duration_s
-        Length of the record, or of each that is averaged.
     """
 
     change: Change
@@ -83,7 +81,6 @@ class Design:
     effort: float
     nats: float
     now_nats: float
-    duration_s: float
 
     @property
     def tells(self) -> bool:

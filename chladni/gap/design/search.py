@@ -6,12 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from chladni.gap.calibration import LINES, LITTLE, PLACES, PROFILE_STEPS, ZERO
-from chladni.gap.design.course import Course, Record, Separation
+from chladni.gap.calibration import EFFECTIVE_SAMPLES, LINES, LITTLE, PLACES, PROFILE_STEPS, ZERO
+from chladni.gap.design.course import Course
 from chladni.gap.design.experiment import Change, Design, Experiment
 from chladni.gap.design.experiments import Reach
 from chladni.gap.design.more_sensors import more_sensors, sensor_words, with_noise_of, with_rows, with_sensors
-from chladni.gap.design.rival import Rival
+from chladni.gap.design.rival import Rival, imitated
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import Windows
 from chladni.gap.plant.tunable import Tunables
@@ -20,6 +20,9 @@ from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.models.core.model import Model
 from chladni.signals.arrays import Real
 from chladni.signals.errors import EstimateError, ModelError
+
+#: An experiment with the rows of the outputs that are measured in it.
+_Record = tuple[Course, tuple[int, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,17 +68,15 @@ class Search:
         self._sensors = more_sensors(model, measurement, suspects)
         self._own = tuple(range(len(measurement.output_names)))
         stretch, begin, self._windows = _stretch(measurement, candidates, 4 * LINES)
-        self._duration_s = measurement.duration_s
         self._reach = Reach(
             model=with_sensors(model, self._sensors), measurement=stretch, begins_with_log=begin == 0, seed=seed
         )
         self._record = with_rows(stretch, self._reach.model, self._sensors)
         self._logged = Course(self._reach.as_logged(), self._rivals, self._record, self._windows)
-        all_noise = with_noise_of(
+        self._noise = with_noise_of(
             noise, measurement.output_units, self._record.output_units[len(self._own) :], self._logged.outputs
         )
-        detail = _details(candidates[0], all_noise, self._logged.outputs)
-        self._separation = Separation(self._rivals, all_noise, detail)
+        self._detail = _details(candidates[0], self._noise, self._logged.outputs)
         self.now_nats = self._nats([(self._logged, self._own)], PROFILE_STEPS // 2)
 
     def best(self) -> tuple[Design, ...]:
@@ -137,7 +138,6 @@ class Search:
             effort=experiment.effort,
             nats=self._nats([(self._logged, self._own), (course, chosen)], 1),
             now_nats=self.now_nats,
-            duration_s=self._duration_s,
         )
         return _Found(design, course, chosen)
 
@@ -145,8 +145,34 @@ class Search:
         nats = self._nats([(self._logged, self._own), (found.course, found.chosen)], PROFILE_STEPS // 2)
         return replace(found, design=replace(found.design, nats=nats))
 
-    def _nats(self, records: list[Record], passes: int) -> float:
-        return float(self._separation.nats(records, passes=passes).min())
+    def _nats(self, records: Sequence[_Record], passes: int) -> float:
+        """Log evidence between the first candidate and the nearest other one, of records that are explained together.
+
+        The mean of what is expected when the one is true and when the other is (Box & Hill 1967), with the likelihood
+        of the contest, and so many linear steps of each refit.
+        """
+        others = range(1, len(self._rivals))
+        return min(0.5 * sum(self._lost(records, pair, passes) for pair in ((0, one), (one, 0))) for one in others)
+
+    def _lost(self, records: Sequence[_Record], pair: tuple[int, int], passes: int) -> float:
+        """Nats that the second of a pair is behind when the first is true, however it's refitted."""
+        rival = self._rivals[pair[1]]
+        at, best = np.zeros(rival.unknowns), np.inf
+        for step in range(passes):
+            try:
+                parts = [
+                    course.part(self._noise, self._detail, chosen, pair, at if step else None)
+                    for course, chosen in records
+                ]
+            except ModelError:
+                # Where it diverges it imitates nothing: what was found before stands.
+                break
+            at, left = imitated(rival, at, parts)
+            shares = [np.log1p(one / part.scale) for one, part in zip(left, parts, strict=True)]
+            lost = 0.5 * EFFECTIVE_SAMPLES * float(np.sum(np.concatenate(shares))) + rival.paid(at)
+            # A step may promise too much; that it promises too little is not possible for long.
+            best = min(best, max(lost, 0.0))
+        return best
 
     def _enough(self, tried: Sequence[_Found]) -> list[_Found]:
         return sorted(

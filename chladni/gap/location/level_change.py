@@ -38,7 +38,7 @@ class LevelChange(Value):
         ``[level, line]`` spectrum of the input over one period.
     lines
         ``[line]`` index of each line in the spectrum of a period.
-    period_samples, sample_rate_hz
+    period_samples
         Of every level.
     """
 
@@ -52,7 +52,6 @@ class LevelChange(Value):
     force: Complex
     lines: Index
     period_samples: int
-    sample_rate_hz: float
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -148,7 +147,6 @@ def level_change(measurements: Sequence[Measurement]) -> LevelChange:
         force=np.array([one[2] for one in found]),
         lines=lines,
         period_samples=int(first.period_samples or 1),
-        sample_rate_hz=first.sample_rate_hz,
     )
 
 

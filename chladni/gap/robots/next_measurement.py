@@ -187,7 +187,6 @@ def _designs(contest: Contest, doubt: Doubt) -> list[tuple[Motion, Design]]:
         if nats is not None:
             design = Design(
                 change="level", words=motion.words, effort=float(effort), nats=doubt.now + nats, now_nats=doubt.now,
-                duration_s=_LENGTH_S,
             )  # fmt: skip
             found.append((motion, design))
             if design.tells:

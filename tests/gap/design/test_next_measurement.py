@@ -124,7 +124,7 @@ def test_variants_of_one_law_are_one_answer(hammer_or_sensor):
 
 def test_candidates_that_nothing_tells_apart_are_said_to_be_one(hammer_or_sensor):
     candidates = sorted(hammer_or_sensor[3], key=lambda one: one.hypothesis.named[0].site, reverse=True)
-    nothing = Design(change="level", words="Repeat", effort=1.0, nats=0.5, now_nats=0.2, duration_s=4.0)
+    nothing = Design(change="level", words="Repeat", effort=1.0, nats=0.5, now_nats=0.2)
     assert sentence([nothing], candidates, {"level", "sensor"}) == (
         "Nothing that was tried (levels up to 4 times, a further sensor) tells a gain error at hammer and a "
         "gain error at a2 apart: the best, 'Repeat', would bring them to 1 sigma (now 0.63). Take them as one answer."
