@@ -28,14 +28,10 @@ def distortion_of(measurement: Measurement) -> Distortion | None:
 
     A nonlinearity of even degree answers a periodic input that has odd lines only with even lines; one of odd degree
     with odd lines. Noise is what differs between periods. On excited lines the odd distortion is read from the odd
-    lines nearby that aren't excited (detection lines; Pintelon & Schoukens, *System Identification*, 2nd ed.,
-    section 4.3), and where there are none from how rough the frequency response is from line to line. When even
-    lines are excited too, even and odd distortion fall on the same lines and only their sum is given.
-
-    Returns
-    -------
-    Distortion or None
-        None when the input isn't periodic, has fewer than two steady periods, or several inputs move at once.
+    lines nearby that aren't excited (detection lines; Pintelon & Schoukens, *System Identification*, 2nd ed., section
+    4.3), and where there are none from how rough the frequency response is from line to line. When even lines are
+    excited too, even and odd distortion fall on the same lines and only their sum is given. There's None when the
+    input isn't periodic, has fewer than two steady periods, or several inputs move at once.
     """
     found = excited_alone(measurement)
     if found is None or not np.any(found[1]):

@@ -112,16 +112,10 @@ def local_fit(inputs: Real, outputs: Real) -> ResidualSpectra | None:
 
 
 def output_error(signals: Complex, y: Complex, r: Real) -> Complex:
-    """Residual ``[block, line]`` of one output with poles of its own.
+    """Residual ``[block, line]`` of one output ``y [block, line]`` with poles of its own.
 
-    Parameters
-    ----------
-    signals
-        ``[block, line, signal]``: the inputs, and 1 where the record's ends leak. Each gets a second-degree N(r).
-    y
-        ``[block, line]``.
-    r
-        ``[line]`` or ``[block, line]`` where the lines lie, -1 to 1.
+    Each of ``signals [block, line, signal]``, the inputs and 1 where the record's ends leak, gets a second-degree
+    N(r). ``r [line]``, or ``[block, line]``, says where the lines lie, -1 to 1.
     """
     regressors, target = _regressors(signals, r), y[:, :, None]
     shifted = target * _powers(r, 1, 1 + POLES)

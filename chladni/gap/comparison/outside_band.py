@@ -53,17 +53,12 @@ class ProductsOutside:
 def products_outside(measurement: Measurement) -> ProductsOutside | None:
     """Tell even from odd distortion where all lines of a band are excited.
 
-    Above the band a linear machine is still; all power there was made by a nonlinearity. To a force f(d) of a
-    motion d the outputs answer linearly, Y(k) = H(k) F(k) with a smooth H. Of every output and every difference of
-    two the displacement d is taken as measured on the excited lines. Even functions of it (abs(d), d^2, abs(d)
-    beyond a dead zone) and odd ones (the same with the sign of d, d^3, the sign of the velocity) are fitted to Y,
-    each with an H that is straight over 62 lines, and the motion that explains most is given.
-
-    Returns
-    -------
-    ProductsOutside or None
-        None without a period or with several inputs, where the band leaves no room below half the sample rate, or
-        where noise is all there is.
+    Above the band a linear machine is still; all power there was made by a nonlinearity. To a force f(d) of a motion
+    d the outputs answer linearly, Y(k) = H(k) F(k) with a smooth H. Of every output and every difference of two the
+    displacement d is taken as measured on the excited lines. Even functions of it (abs(d), d^2, abs(d) beyond a dead
+    zone) and odd ones (the same with the sign of d, d^3, the sign of the velocity) are fitted to Y, each with an H
+    that is straight over 62 lines, and the motion that explains most is given. There's None without a period or with
+    several inputs, where the band leaves no room below half the sample rate, or where noise is all there is.
     """
     found = excited_alone(measurement)
     index = None if found is None else _blocks(found[1])

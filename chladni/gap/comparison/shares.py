@@ -174,17 +174,11 @@ def regime_shares(
 
 
 def gap_map(residual: Real, measured: Real, sample_rate_hz: float) -> tuple[Real, Real, Real]:
-    """Give the gap's density over time and frequency.
+    """Give the gap's density over time and frequency, by Hann segments with half overlap, about as many as lines.
 
-    Hann segments with half overlap, about as many slices as lines.
-
-    Returns
-    -------
-    time_s, frequency_hz
-        ``[time]`` middle of each slice, ``[frequency]``.
-    density
-        ``[time, frequency]`` 1/Hz, mean over outputs of the one-sided density of the scaled residual: over frequency
-        it integrates to the square of the pooled gap of that slice.
+    There's the middle of each slice in seconds, ``[time]``, the frequency in Hz, ``[frequency]``, and the density in
+    1/Hz, ``[time, frequency]``: the mean over outputs of the one-sided density of the scaled residual. Over frequency
+    it integrates to the square of the pooled gap of that slice.
     """
     samples = residual.shape[1]
     # Twice the square root of the samples balances slices with lines.

@@ -19,17 +19,7 @@ _TOLD_HZ = 1e4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Read:
-    """What was read of which log.
-
-    Attributes
-    ----------
-    log
-        Its name, for messages.
-    begins_s
-        Time of the first sample, from the log's start.
-    damage
-        Sentences on what of the file couldn't be read.
-    """
+    """What was read of which log, when it begins there, and what of the file couldn't be read, for messages."""
 
     log: str
     begins_s: float = 0.0

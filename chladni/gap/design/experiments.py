@@ -22,16 +22,9 @@ Band = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reach:
-    """The log that experiments start from.
+    """The log, or a stretch of it, that experiments start from; the same seed gives the same answer.
 
-    Attributes
-    ----------
-    measurement
-        The log, or a stretch of it.
-    begins_with_log
-        Whether it begins where the log does, with the initial states that fits found.
-    seed
-        Start of the random numbers: the same seed gives the same answer.
+    Where the stretch begins with the log, they start from the initial states that fits found.
     """
 
     model: Model

@@ -73,14 +73,8 @@ def with_rows(measurement: Measurement, model: Model, sensors: Sequence[Structur
 def with_noise_of(noise: NoiseFloor, units: Sequence[str], more_units: Sequence[str], signals: Real) -> NoiseFloor:
     """Give the noise of the log's outputs and of sensors that would be as good.
 
-    A sensor of a unit that the log holds is as noisy as those in the middle; another one as noisy for its signal.
-
-    Parameters
-    ----------
-    units, more_units
-        Of the log's outputs, and of the new sensors.
-    signals
-        ``[output, sample]`` of all, the new ones last.
+    A sensor of a unit that the log holds is as noisy as those in the middle; another one as noisy for its signal, of
+    all ``signals [output, sample]`` with the new ones last.
     """
     size = np.maximum(np.std(signals, axis=1), ZERO)
     count = len(units)

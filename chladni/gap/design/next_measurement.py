@@ -63,17 +63,10 @@ def different(candidates: Sequence[Contestant]) -> list[Contestant]:
 
 
 def sentence(designs: Sequence[Design], candidates: Sequence[Contestant], tried: Collection[Change]) -> str | None:
-    """Write designs, the one to do first in front, as one sentence.
+    """Write designs, the one to do first in front, as one sentence, with the kinds of changes that were tried.
 
-    Parameters
-    ----------
-    tried
-        Kinds of changes that were looked at.
-
-    Returns
-    -------
-    str or None
-        None without a design, or when the model is right and nothing would tell of an effect that acts all the same.
+    There's None without a design, or when the model is right and nothing would tell of an effect that acts all the
+    same.
     """
     if not designs:
         return None

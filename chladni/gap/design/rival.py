@@ -19,16 +19,10 @@ from chladni.signals.arrays import Real
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """What a candidate predicts, and its slopes.
+    """What a candidate predicts, ``outputs [output, sample]``, and its slopes.
 
-    Attributes
-    ----------
-    outputs
-        ``[output, sample]``.
-    own
-        ``[unknown, output, sample]`` by its parameters and those of its effects.
-    starts
-        ``[state, output, sample]`` by the initial state of each window.
+    Those are ``own [unknown, output, sample]`` by its parameters and those of its effects, and ``starts [state,
+    output, sample]`` by the initial state of each window.
     """
 
     outputs: Real
@@ -67,19 +61,9 @@ class Rival:
         return int(self.low.size)
 
     def predicted(self, run: FreeRun, initial: Real, at: Real | None = None) -> Prediction:
-        """Predict an experiment.
+        """Predict an experiment from ``initial [window, state]``, as fitted or ``at [unknown]``.
 
-        Parameters
-        ----------
-        initial
-            ``[window, state]``.
-        at
-            ``[unknown]``; as fitted by default.
-
-        Raises
-        ------
-        ModelError
-            When it diverges there.
+        A candidate that diverges there is a `ModelError`.
         """
         x = np.zeros(self.unknowns) if at is None else at
         here, changed = self._setting(x), around(self._setting, x, self._steps(x))

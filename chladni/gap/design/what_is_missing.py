@@ -35,15 +35,8 @@ def what_is_missing(
 ) -> str | None:
     """Say what to measure where a log is too short, too quiet, or has too few sensors to say where a force acts.
 
-    Parameters
-    ----------
-    sites
-        Names of the most likely sites, best first; every joint and body without any.
-
-    Returns
-    -------
-    str or None
-        Sentences, or None when nothing of this is missing.
+    Sites are names of the most likely ones, best first; every joint and body without any. There's None when nothing
+    of this is missing.
     """
     found = [
         _length(model, measurement),

@@ -141,13 +141,8 @@ def driven_parts(run: FreeRun) -> tuple[Real, Real]:
     """Give ``[output, sample]`` of the log, and of the linear model from rest, without what a start can give.
 
     A free axis is where it began to be: most of its position is its start. What is left of both signals, once every
-    pattern that an initial state of the window prints is taken off (least squares, output by output), only the
-    inputs can have driven; its scale is the model's.
-
-    Raises
-    ------
-    ModelError
-        When the model diverges.
+    pattern that an initial state of the window prints is taken off (least squares, output by output), only the inputs
+    can have driven; its scale is the model's. A model that diverges is a `ModelError`.
     """
     # Laws would make the patterns depend on one another; friction from rest isn't friction of a machine in motion.
     linear = FreeRun(run.model.with_effects(()), run.measurement, windows=run.windows)

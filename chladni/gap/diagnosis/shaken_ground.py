@@ -45,11 +45,6 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
     With a machine that stands on one joint, a force there is nearly the ground's motion. What tells them apart is
     that a law of the joint follows its motion, and an actuator's the inputs; the floor follows neither. A motion of
     its own for every sample explains much: of a floor the other sensors must tell more than the model alone does.
-
-    Parameters
-    ----------
-    tuned
-        The model without any cause.
     """
     kind = next((one for one in study.kinds if one.clues.of_force is not None and "ground" in one.sites), None)
     if kind is None or len(study.measurement.output_names) < 2:
@@ -98,16 +93,8 @@ def _follows(study: Study, located: Located) -> bool:
 def floor_motion(problem: LinearProblem, ground: Site, z: Real, kind: EffectKind) -> Mapping[str, FittedNumber]:
     """Give the numbers of an effect at the ground that the sensors tell, without a standard deviation.
 
-    Parameters
-    ----------
-    problem
-        Of the whole record.
-    ground
-        The site whose acceleration it is.
-    z
-        Parameters of the model, in units of their tolerance.
-    kind
-        An effect whose force follows nothing, see `Clues`; of another one nothing is told.
+    The problem is of the whole record, z in units of the parameters' tolerances. An effect's force must follow
+    nothing, see `Clues`; of another one nothing is told.
     """
     if kind.clues.of_force is None:
         return {}
@@ -124,14 +111,8 @@ def predicted_by_others(problem: LinearProblem, found: Profile) -> Real:
 
     The force is Wiener's estimate (Kay 1993, *Estimation theory*, section 12.7): the less it stands out of the noise
     of the sensors that tell it, the less of that is believed. How strong it is around a line all sensors tell: where
-    the others hardly feel it, they couldn't tell that either.
-
-    Parameters
-    ----------
-    problem
-        Of the whole record, two sensors at least.
-    found
-        Profile of a force at one site.
+    the others hardly feel it, they couldn't tell that either. The problem is of the whole record and of two sensors
+    at least, the profile that of a force at one site.
     """
     measurement = problem.measurement
     lines = all_lines(measurement.samples, measurement.sample_rate_hz)

@@ -22,16 +22,13 @@ _BOTH_POINTS = round(sqrt(LAW_POINTS))
 
 
 def left_by_any_law(location: Location, located: Located, site: Site) -> float:
-    """Share of the gap that a force at a site leaves which follows the motion there, or the inputs.
+    """Share of the gap that a force at a site leaves which follows the motion there, or the inputs, 0 to 1.
 
     At a joint the force is the sum of any function of the displacement and any of the velocity, any smooth function
     of both, or the displacement times a tone, as of a stiffness that turns with a shaft; at an input any function of
     the command, any smooth one of it and its slope, and any filter of all inputs; elsewhere such a filter. Functions
-    are sums of hats whose amplitudes are found by the screen, with the parameters refitted under them.
-
-    Returns
-    -------
-    Misfit beyond noise over that of the tuned model alone, 0 to 1.
+    are sums of hats whose amplitudes are found by the screen, with the parameters refitted under them. It's the
+    misfit beyond noise over that of the tuned model alone.
     """
     problem = location.problem
     motion = recovered(problem, located.profile, site)

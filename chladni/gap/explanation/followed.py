@@ -17,12 +17,8 @@ def followed(screen: Screen, start: Screened) -> tuple[Screened, Screen] | None:
 
     A free force hides what parameters should do: those of its place may lie many widths of a resonance from the right
     ones, where a linearisation promises what no parameters keep. The force along the recovered motion stays what it
-    is, its amplitudes are refitted.
-
-    Returns
-    -------
-    screened, screen
-        With the misfit at its own parameters, not a promised one; None when no amplitudes make this effect there.
+    is, its amplitudes are refitted. The misfit is that at the trial's own parameters, not a promised one; None when
+    no amplitudes make this effect there.
     """
     starts = [one for one in (_held(screen, start, z) for z in (screen.z, start.z)) if one is not None]
     if not starts:

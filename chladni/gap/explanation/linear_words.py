@@ -29,16 +29,9 @@ from chladni.signals.errors import ModelError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearFit:
-    """A linear effect fitted together with the parameters.
+    """A linear effect, with the numbers found, fitted together with the parameters ``z [parameter]``.
 
-    Attributes
-    ----------
-    effect
-        With the numbers found.
-    z
-        ``[parameter]`` in units of their tolerance.
-    chi
-        Misfit over what noise alone leaves.
+    `chi` is the misfit over what noise alone leaves.
     """
 
     effect: AttachedEffect
@@ -53,14 +46,8 @@ def linear_hypotheses(
 
     The screen weighs an effect along a motion that was recovered with the parameters that suit any force there. Where
     few sensors leave that motion open, or an effect moves resonances far, it finds a wrong size. Here resonances may
-    lie elsewhere at first, as when a model is tuned.
-
-    Parameters
-    ----------
-    model
-        Of the location's problem.
-    count
-        Of screened forms that are fitted, at half a second each. A black box has no equations to fit.
+    lie elsewhere at first, as when a model is tuned. The model is of the location's problem; a black box has no
+    equations to fit. Each form that is fitted costs half a second.
     """
     if isinstance(model, BlackBox):
         return []
@@ -126,14 +113,8 @@ def linear_elsewhere(
     """Fit linear effects where no place that was followed tells of them, as their first step promises; the best.
 
     An unknown force is no bound on every effect: a gyroscopic coupling is no force between two bodies, and a force is
-    taken to be band-limited, which what a held reference makes of a gain inside its loop isn't.
-
-    Parameters
-    ----------
-    model
-        Of the location's problem.
-    screened
-        Forms at the places that were followed: what leaves many times as much as the best isn't worth a fit.
+    taken to be band-limited, which what a held reference makes of a gain inside its loop isn't. The model is of the
+    location's problem. What leaves many times as much as the best screened form isn't worth a fit.
     """
     if isinstance(model, BlackBox):
         return []
@@ -152,18 +133,10 @@ def linear_beside(
     z: Real,
     enough: float,
 ) -> list[Hypothesis]:
-    """Fit linear effects beside those that are kept, as far as their first step promises; the best.
+    """Fit linear effects beside linear ones that are kept, as far as their first step promises; the best.
 
-    Parameters
-    ----------
-    model
-        Of the location's problem.
-    kept
-        Linear ones.
-    z
-        ``[parameter]`` of their fit.
-    enough
-        Misfit over what noise alone leaves that they must come below.
+    The model is of the location's problem, ``z [parameter]`` of the fit of those that are kept. Misfits over what
+    noise alone leaves must come below `enough`.
     """
     beside = model.with_effects((*model.effects, *kept))
     old = location.problem

@@ -18,16 +18,9 @@ from chladni.signals.arrays import Complex, Real
 
 
 class HeldSite:
-    """Residual of a measurement at given parameters, and what forces at a site print of it.
+    """Residual of a whole record at held parameters ``z``, and what forces at a site print of it.
 
-    Parameters
-    ----------
-    problem
-        Of the whole record.
-    z
-        ``[parameter]`` held.
-    others
-        Sites whose force may be anything meanwhile.
+    Forces at other sites may be anything meanwhile.
     """
 
     def __init__(self, problem: LinearProblem, z: Real, site: Site, others: Sequence[Site] = ()) -> None:
@@ -111,16 +104,10 @@ class Screened:
 
 
 class Regression:
-    """Least squares of columns on a residual, with the parameters refitted beside them.
+    """Least squares of columns on a whitened residual, with the parameters refitted beside them.
 
-    Parameters
-    ----------
-    rest
-        ``[number]`` the residual, whitened.
-    slopes
-        ``[parameter, number]`` of the parameters.
-    z
-        ``[parameter]`` where these are, in units of their tolerance.
+    ``slopes [parameter, number]`` are those of the parameters, ``z [parameter]`` where these are, in units of their
+    tolerance.
     """
 
     def __init__(self, rest: Real, slopes: Real, z: Real, limit: float | Real) -> None:

@@ -49,14 +49,8 @@ class ModalPaths(Value):
         """Give what modes outside the band print of a force with this direction: the known part, and free terms.
 
         The sensor at the applied force answers this one as this one's places answered that (reciprocity). Of the
-        other sensors only the share at the driving point was measured.
-
-        Returns
-        -------
-        known
-            ``[output, line]``.
-        free
-            ``[term, output, line]``; none for a force at the driving point.
+        other sensors only the share at the driving point was measured. They are ``[output, line]`` and ``[term,
+        output, line]``; there are no free terms for a force at the driving point.
         """
         known = direction[self.driving] * self.measured
         known[self.driving] = direction @ self.measured

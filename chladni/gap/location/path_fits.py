@@ -95,14 +95,8 @@ def pattern_losses(paths: ModalPaths, direction: Real, change: Complex) -> Real:
     """Square ``[line]`` of what forces of any shape, one number a line and level, leave of a change.
 
     The pattern is ``sum_r c_r modal_r + known + sum_t u_t outside_t`` with c within two sigma of what reciprocity
-    gives for this place; u, which no measurement gave, is free. Both are fitted, the same for all lines.
-
-    Parameters
-    ----------
-    direction
-        ``[output]`` of the force over the sensors.
-    change
-        ``[level, output, line]``.
+    gives for this place; u, which no measurement gave, is free. Both are fitted, the same for all lines. The
+    direction is the ``[output]`` of the force over the sensors, the change ``[level, output, line]``.
     """
     expected, std = paths.weights(direction)
     known, outside = paths.outside_of(direction)

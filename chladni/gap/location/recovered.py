@@ -90,14 +90,9 @@ def recovered(problem: LinearProblem, found: Profile, site: Site, others: Sequen
     """Recover force and motion at a site, with the parameters of a profile of that place.
 
     On each line the force is the one that explains most, held back where noise would make most of it (Wiener's
-    filter, with the force's power taken from its neighbours).
-
-    Parameters
-    ----------
-    problem
-        Of the whole record; its lines are those that trials will be weighed on.
-    others
-        Sites whose force may be anything meanwhile; what they move is part of the motion.
+    filter, with the force's power taken from its neighbours). The problem is of the whole record; its lines are those
+    that trials will be weighed on. Forces at other sites may be anything meanwhile; what they move is part of the
+    motion.
     """
     measurement = problem.measurement
     lines = all_lines(measurement.samples, measurement.sample_rate_hz)

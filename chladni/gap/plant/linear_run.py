@@ -36,17 +36,9 @@ class LinearRuns:
     def outputs(
         self, compiled: CompiledModel, rows: Whole, windows: Sequence[tuple[int, int]], initial: Real
     ) -> Real:
-        """Give ``[output, sample]`` of the outputs `rows`, before maps of samples.
+        """Give ``[output, sample]`` of the outputs `rows`, before maps of samples, from ``initial [window, state]``.
 
-        Parameters
-        ----------
-        initial
-            ``[window, state]``.
-
-        Raises
-        ------
-        ModelError
-            When the model diverges.
+        A model that diverges is a `ModelError`.
         """
         hold = hold_of(compiled, self._rate_hz)
         inputs = self._inputs.rows(compiled, hold)

@@ -32,15 +32,9 @@ def view_slopes(
 ) -> Complex:
     """``[change, output, segment, line]``: derivatives of `LinearView.response`.
 
-    With ``z X = Phi X + Gamma R + ...`` the states move by ``(z I - Phi)^-1 (dPhi X + dGamma R + ...)``, of which
-    the outputs see what `LinearView.printed` holds: no change needs a solution of its own.
-
-    Parameters
-    ----------
-    changed
-        Models of the `same_frame` whose equations are changed a little.
-    step
-        By how much, in the unit that derivatives are wanted for.
+    With ``z X = Phi X + Gamma R + ...`` the states move by ``(z I - Phi)^-1 (dPhi X + dGamma R + ...)``, of which the
+    outputs see what `LinearView.printed` holds: no change needs a solution of its own. The changed models are of the
+    `same_frame`; their equations are changed by `step`, in the unit that derivatives are wanted for.
     """
     n, count = len(view.compiled.states), len(changed)
     signals = [view.states(transient, forces), view.inputs()]

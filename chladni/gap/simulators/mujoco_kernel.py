@@ -75,16 +75,9 @@ class Laws(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What is kept of a run.
+    """What is kept of a run: ``outputs [output, sample]``, and ``[joint, sample]`` of the joints.
 
-    Attributes
-    ----------
-    outputs
-        ``[output, sample]``.
-    rows
-        ``[output]`` place in MuJoCo's sensor data.
-    displacement, motion, force
-        ``[joint, sample]``.
+    ``rows [output]`` are places in MuJoCo's sensor data.
     """
 
     outputs: Real
@@ -245,14 +238,7 @@ def runs_away(mujoco: Simulated) -> bool:
 def run(mujoco: Simulated, laws: Laws, record: Record, inputs: Real, rows: Whole, steps: int, step_s: float) -> int:
     """Simulate sample by sample, each input held until the next; give the samples done, fewer when it runs away.
 
-    Parameters
-    ----------
-    inputs
-        ``[input, sample]``.
-    rows
-        ``[input]`` place in MuJoCo's ``ctrl``.
-    steps, step_s
-        Steps a sample, and how long each is.
+    ``inputs [input, sample]`` go to ``rows [input]`` of MuJoCo's ``ctrl``; each sample has so many steps.
     """
     busy = laws.first[-1] > 0
     samples: int = inputs.shape[1]

@@ -56,14 +56,8 @@ class Slopes:
 class FitProblem:
     """Unknowns, bounds, prior, cost and slopes of one fit.
 
-    Parameters
-    ----------
-    numbers
-        Which of their parameters move.
-    freed
-        Names of parameters that may be wrong by a slip, see `Tunables`.
-    start_z
-        ``[parameter]``: where they start, or stay.
+    The numbers are those of the effects' parameters that move; freed parameters may be wrong by a slip, see
+    `Tunables`. They start, or stay, at ``start_z [parameter]``.
     """
 
     def __init__(
@@ -154,15 +148,8 @@ class FitProblem:
     def slopes(self, here: Evaluation, *, fresh: bool = False) -> Slopes:
         """Gauss and Newton's equations around a point, each output weighed by what it misses.
 
-        Parameters
-        ----------
-        fresh
-            Whether secants don't do.
-
-        Raises
-        ------
-        EstimateError
-            When neighbouring motions part so fast that slopes leave the numbers.
+        Fresh ones are no secants. Where neighbouring motions part so fast that slopes leave the numbers there's an
+        `EstimateError`.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             found = self._equations(here, *self._columns(here, fresh=fresh))

@@ -12,16 +12,9 @@ from chladni.signals.errors import EstimateError
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """Whitened residual of one free run.
+    """Whitened residual of one free run: ``white [output, training sample]``, and its mean square ``power [output]``.
 
-    Attributes
-    ----------
-    white
-        ``[output, training sample]``, offsets taken out.
-    power
-        ``[output]`` mean square of it.
-    offsets
-        ``[output]`` constant that was taken out, in the output's unit.
+    ``offsets [output]`` are constants that were taken out, in the output's unit.
     """
 
     white: Real
