@@ -27,6 +27,7 @@ _HOME = {
     "make_demo_log": "chladni.apps.demo_log",
     "diagnose_gap": "chladni.apps.diagnose",
     "explained_model": "chladni.apps.explained_model",
+    "explained_simulator": "chladni.apps.explained_model",
     "tuned_model": "chladni.apps.explained_model",
     "LevelLocation": "chladni.apps.level_location",
     "locate_from_levels": "chladni.apps.level_location",
@@ -41,7 +42,6 @@ _HOME = {
     "psd": "chladni.apps.psd",
     "compare_levels": "chladni.gap.comparison.levels",
     "diagnose_simulator": "chladni.gap.diagnosis.of_simulator",
-    "explained_simulator": "chladni.gap.diagnosis.of_simulator",
     "Diagnosis": "chladni.gap.records.diagnosis",
     "Measurement": "chladni.gap.records.measurement",
     "callable_simulator": "chladni.gap.simulators.callable_simulator",
@@ -232,6 +232,7 @@ if TYPE_CHECKING:
     from chladni.apps.demo_log import make_demo_log as make_demo_log
     from chladni.apps.diagnose import diagnose_gap as diagnose_gap
     from chladni.apps.explained_model import explained_model as explained_model
+    from chladni.apps.explained_model import explained_simulator as explained_simulator
     from chladni.apps.explained_model import tuned_model as tuned_model
     from chladni.apps.frf import frf as frf
     from chladni.apps.level_location import LevelLocation as LevelLocation
@@ -246,7 +247,6 @@ if TYPE_CHECKING:
     from chladni.apps.show import write_report as write_report
     from chladni.gap.comparison.levels import compare_levels as compare_levels
     from chladni.gap.diagnosis.of_simulator import diagnose_simulator as diagnose_simulator
-    from chladni.gap.diagnosis.of_simulator import explained_simulator as explained_simulator
     from chladni.gap.records.diagnosis import Diagnosis as Diagnosis
     from chladni.gap.records.measurement import Measurement as Measurement
     from chladni.gap.simulators.callable_simulator import callable_simulator as callable_simulator

@@ -1,16 +1,21 @@
 """A model nearer to its machine: tuned to a log, or with what a diagnosis found."""
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 from chladni.gap.comparison.measuring import measurement_of
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Diagnosis
+from chladni.gap.simulators.simulator import Simulator
+from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.io.source import SeriesLike, log_or_series, series_of
 from chladni.models.core.model import Effect, Model
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.effect_kind import EffectKind
 
+ModelT = TypeVar("ModelT", bound=Model)
 
-def explained_model(model: Model, found: Diagnosis, *, own_effects: Sequence[EffectKind] = ()) -> Model:
+
+def explained_model(model: ModelT, found: Diagnosis, *, own_effects: Sequence[EffectKind] = ()) -> ModelT:
     """Give the model with its parameters as tuned and with the effects that were named, ready to simulate.
 
     Parameters
@@ -44,6 +49,26 @@ def explained_model(model: Model, found: Diagnosis, *, own_effects: Sequence[Eff
         if cause.effect != PARAMETER
     ]
     return model.with_values(values).with_effects((*model.effects, *added))
+
+
+def explained_simulator(
+    simulator: Simulator, diagnosis: Diagnosis, *, own_effects: Sequence[EffectKind] = ()
+) -> WrappedSimulator:
+    """Give the simulator as a diagnosis says that the machine is: tuned, and with the causes that it names.
+
+    Parameters
+    ----------
+    simulator, diagnosis
+        What was diagnosed, and what came of it.
+    own_effects
+        Those that took part.
+
+    Raises
+    ------
+    ModelError
+        When the diagnosis is another simulator's.
+    """
+    return explained_model(WrappedSimulator(simulator=simulator), diagnosis, own_effects=own_effects)
 
 
 def tuned_model(

@@ -5,11 +5,10 @@ from dataclasses import replace
 
 from chladni.gap.comparison.measuring import measurement_of
 from chladni.gap.diagnosis.diagnose import diagnose
-from chladni.gap.records.diagnosis import PARAMETER, Diagnosis
+from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.simulators.simulator import Simulator
 from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.io.source import SeriesLike, series_of
-from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.effect_kind import EffectKind
 from chladni.signals.renamed import renamed
 
@@ -80,36 +79,3 @@ def diagnose_simulator(
         progress=progress,
     )
     return replace(found, remarks=(*remarks, *found.remarks))
-
-
-def explained_simulator(
-    simulator: Simulator, diagnosis: Diagnosis, *, own_effects: Sequence[EffectKind] = ()
-) -> WrappedSimulator:
-    """Give the simulator as a diagnosis says that the machine is: tuned, and with the causes that it names.
-
-    Parameters
-    ----------
-    simulator, diagnosis
-        What was diagnosed, and what came of it.
-    own_effects
-        Those that took part.
-
-    Raises
-    ------
-    ModelError
-        When the diagnosis is another simulator's.
-    """
-    own = {kind.name: kind for kind in own_effects}
-    effects = [
-        attached(
-            own.get(cause.effect, cause.effect),
-            cause.site,
-            {name: number.value for name, number in cause.parameters.items()},
-            variant=cause.variant,
-            source=cause.source,
-        )
-        for cause in diagnosis.causes
-        if cause.effect != PARAMETER
-    ]
-    values = {name: number.value for name, number in diagnosis.tuned_parameters.items()}
-    return WrappedSimulator(simulator=simulator, values=values, effects=tuple(effects))

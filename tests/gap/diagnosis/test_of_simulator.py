@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.gap.diagnosis.of_simulator import diagnose_simulator, explained_simulator
+from chladni.apps.explained_model import explained_simulator
+from chladni.gap.diagnosis.of_simulator import diagnose_simulator
 from chladni.gap.simulators.mujoco_simulator import mujoco_simulator
 from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.models.core.parameter import Parameter, Parameters
