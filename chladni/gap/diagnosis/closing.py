@@ -94,6 +94,7 @@ def closing_of(yardstick: Yardstick, before: Real, tuned: Real, after: Real, *, 
     bootstrap's.
     """
     measured, held = yardstick.measurement.outputs, yardstick.held
+    log, rate = yardstick.measurement.log, yardstick.measurement.sample_rate_hz
     gaps = [held_gap(measured, one, held) for one in (before, tuned, after)]
     return Closing(
         before=gaps[0],
@@ -103,7 +104,9 @@ def closing_of(yardstick: Yardstick, before: Real, tuned: Real, after: Real, *, 
         closed=yardstick.closed(gaps[0], gaps[2]),
         explained=yardstick.explained(gaps[1], gaps[2]),
         interval=_interval(yardstick, before, after, seed),
-        held_out=tuple(_stretches(yardstick)),
+        held_out=tuple(
+            HeldOut(log=log, start_s=start / rate, end_s=stop / rate) for start, stop in channel_runs(held)
+        ),
         by=yardstick.by,
         horizon_s=yardstick.horizon_s,
         noise_at_most=bool(yardstick.noise.upper_bound.any()),
@@ -132,8 +135,3 @@ def _interval(yardstick: Yardstick, before: Real, after: Real, seed: int) -> tup
         return None
     low, high = np.quantile(shares, ((1 - COVERAGE) / 2, (1 + COVERAGE) / 2))
     return float(low), float(high)
-
-
-def _stretches(yardstick: Yardstick) -> list[HeldOut]:
-    rate, log = yardstick.measurement.sample_rate_hz, yardstick.measurement.log
-    return [HeldOut(log=log, start_s=start / rate, end_s=stop / rate) for start, stop in channel_runs(yardstick.held)]

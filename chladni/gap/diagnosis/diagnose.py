@@ -243,7 +243,11 @@ def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) ->
     They're those of the run of the fit that is believed, but at the site whose motion was recovered: the sensors tell
     that without any law. A run that diverges tells nothing, and a joint whose motion can't be told is left out.
     """
-    moved = _of_run(study, fit)
+    try:
+        run = study.contest.run.motions(fit.z, fit.effects, fit.initial)
+    except ModelError:
+        run = {}
+    moved = {name: (one.displacement, one.velocity) for (name, kind), one in run.items() if kind == "joint"}
     if known is not None and known.site.kind == "joint":
         moved[known.site.name] = known.displacement, known.velocity
     period = round(study.measurement.sample_rate_hz / lowest_hz(study.model, study.measurement))
@@ -257,12 +261,3 @@ def joint_motions(study: Study, fit: OutputErrorFit, known: Recovered | None) ->
         found[f"{port.name}.velocity"] = Variable(velocity, f"{unit}/s")
         found[f"{port.name}.amplitude"] = Variable(amplitude(displacement, period), unit)
     return found
-
-
-def _of_run(study: Study, fit: OutputErrorFit) -> dict[str, tuple[Real, Real]]:
-    """Displacement and velocity of each joint during a fitted model's run, by name."""
-    try:
-        found = study.contest.run.motions(fit.z, fit.effects, fit.initial)
-    except ModelError:
-        return {}
-    return {name: (one.displacement, one.velocity) for (name, kind), one in found.items() if kind == "joint"}

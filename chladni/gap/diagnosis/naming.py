@@ -1,6 +1,6 @@
 """From contestants to named causes: groups, alternatives, probabilities, fitted numbers."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,7 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
         return ()
     if causes.shaken is not None:
         shaken = causes.shaken
-        return (_plain(shaken.effect, "ground", UNWEIGHED, group=shaken.group, numbers=shaken.parameters),)
+        return (_unweighed(shaken.effect, "ground", shaken.parameters, group=shaken.group),)
     found: list[Cause] = []
     if causes.best is not causes.tuned:
         places = range(len(causes.best.hypothesis.named))
@@ -32,31 +32,21 @@ def causes_named(study: Study, causes: Causes) -> tuple[Cause, ...]:
         ]
         found += [one for one in told if one.probability >= NAMED]
     if causes.verdict == "effect" and study.stepping is not None:
-        found += _in_steps(study, study.stepping, {one.site for one in found if one.effect == study.stepping.name})
+        taken = {one.site for one in found if one.effect == study.stepping.name}
+        steps = {site: one.step for site, one in study.lattices.items() if site not in taken}
+        found += _by_samples(study, study.stepping, steps)
     if causes.constants and study.of_constant is not None:
-        found += _constants(study, study.of_constant, causes.constants)
+        found += _by_samples(study, study.of_constant, causes.constants)
     return tuple(found)
 
 
-def _constants(study: Study, kind: EffectKind, constants: Mapping[str, float]) -> list[Cause]:
+def _by_samples(study: Study, kind: EffectKind, values: Mapping[str, float]) -> list[Cause]:
+    """Causes of one number that samples themselves show, by the names of their outputs."""
     (name,) = kind.required
+    units = dict(zip(study.measurement.output_names, study.measurement.output_units, strict=True))
     return [
-        _plain(kind.name, site, UNWEIGHED, numbers={name: FittedNumber(value=one, std=None, unit=_unit(study, site))})
-        for site, one in constants.items()
-    ]
-
-
-def _in_steps(study: Study, kind: EffectKind, taken: Collection[str]) -> list[Cause]:
-    (name,) = kind.required
-    return [
-        _plain(
-            kind.name,
-            site,
-            UNWEIGHED,
-            numbers={name: FittedNumber(value=one.step, std=None, unit=_unit(study, site))},
-        )
-        for site, one in study.lattices.items()
-        if site not in taken
+        _unweighed(kind.name, site, {name: FittedNumber(value=one, std=None, unit=units[site])})
+        for site, one in values.items()
     ]
 
 
@@ -149,26 +139,15 @@ def _finite(std: float | None) -> float | None:
     return float(std) if std is not None and np.isfinite(std) else None
 
 
-def _plain(
-    effect: str,
-    site: str,
-    probability: float,
-    *,
-    numbers: Mapping[str, FittedNumber],
-    group: tuple[str, ...] = (),
-) -> Cause:
+def _unweighed(effect: str, site: str, numbers: Mapping[str, FittedNumber], *, group: tuple[str, ...] = ()) -> Cause:
     return Cause(
         effect=effect,
         site=site,
-        probability=probability,
+        probability=UNWEIGHED,
         group=tuple(dict.fromkeys([site, *group])),
         alternatives=(),
         parameters=numbers,
     )
-
-
-def _unit(study: Study, name: str) -> str:
-    return study.measurement.output_units[study.measurement.output_names.index(name)]
 
 
 def correlation_of(tunables: Tunables, fit: OutputErrorFit) -> Correlation | None:

@@ -33,14 +33,10 @@ def plausible_places(location: Location) -> list[Located]:
 
 def near_places(location: Location, same: float) -> list[Located]:
     """Give the places that leave at most `same` times what the best one does, or little more of the gap."""
-    first = _least_chi(location)
+    # Less than noise is no better than noise.
+    first = max(location.ranked[0].profile.chi, 1.0)
     enough = max(same * first, first + NEAR * (location.tuned.chi - first))
     return [one for one in location.ranked if one.profile.chi < enough]
-
-
-def _least_chi(location: Location) -> float:
-    """Give what the best place leaves, over the noise's power; less than noise is no better than noise."""
-    return max(location.ranked[0].profile.chi, 1.0)
 
 
 def is_lost(location: Location, left: float) -> bool:

@@ -1,7 +1,5 @@
 """What limits a diagnosis: sensors, parameters, noise, excitation."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from chladni.gap.calibration import LISTED
@@ -19,15 +17,7 @@ from chladni.signals.engineering import engineering
 
 
 def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Distortion | None) -> tuple[str, ...]:
-    """What limits an answer.
-
-    Parameters
-    ----------
-    shown
-        The contestant whose numbers are told.
-    distortion
-        Of the log, None where its excitation doesn't tell any.
-    """
+    """What limits an answer that tells the numbers of a contestant; without distortion the excitation tells none."""
     found = []
     if len(study.measurement.output_names) < 2:
         found.append(
@@ -43,11 +33,16 @@ def remarks_on(study: Study, causes: Causes, shown: Contestant, distortion: Dist
         found.append(f"{', '.join(causes.distorted)}: what is left follows its own signal in a curve or in steps")
     found += _constants(study, causes, shown)
     if shown.fit.undetermined:
-        found.append(_undetermined(shown.fit.undetermined))
+        found.append(
+            f"this log doesn't determine {some_of(shown.fit.undetermined, count=LISTED)}: only the stated tolerance "
+            "holds what it can't tell, which may have moved inside that with what it depends on"
+        )
     if np.any(causes.noise.upper_bound):
         found.append("the noise floor of some outputs is an upper bound: distortion may be in it")
     found += _of_black_box(study, shown)
-    return (*found, *filter(None, [_stability(study, shown)]), *_of_distortion(study.measurement, distortion))
+    run = study.contest.run
+    stability = instability_found(run.compiled(), run.compiled(shown.fit.z, shown.fit.effects))
+    return (*found, *filter(None, [stability]), *_of_distortion(study.measurement, distortion))
 
 
 def _constants(study: Study, causes: Causes, shown: Contestant) -> list[str]:
@@ -74,18 +69,6 @@ def _of_black_box(study: Study, shown: Contestant) -> list[str]:
         "the step, or part of this answer is the step's"
     )
     return [*study.model.untold, of_step]
-
-
-def _undetermined(names: Sequence[str]) -> str:
-    return (
-        f"this log doesn't determine {some_of(names, count=LISTED)}: only the stated tolerance holds what it can't "
-        "tell, which may have moved inside that with what it depends on"
-    )
-
-
-def _stability(study: Study, shown: Contestant) -> str | None:
-    run = study.contest.run
-    return instability_found(run.compiled(), run.compiled(shown.fit.z, shown.fit.effects))
 
 
 def _of_distortion(measurement: Measurement, distortion: Distortion | None) -> tuple[str, ...]:

@@ -53,7 +53,7 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
     tied = [one for one in study.location.ranked if one.profile.chi < ALIKE * first]
     if len(tied) > 2:
         return None
-    ground = next((one for one in tied if _has_ground(one)), None)
+    ground = next((one for one in tied if _grounds(one)), None)
     if ground is None or ground.profile.chi > min(CLEARLY, TIED * first):
         return None
     predicted = predicted_by_others(study.location.problem, ground.profile)
@@ -74,10 +74,6 @@ def shaken_by(study: Study, tuned: Contestant) -> ShakenGround | None:
         predicted=predicted,
         parameters=parameters,
     )
-
-
-def _has_ground(located: Located) -> bool:
-    return bool(_grounds(located))
 
 
 def _grounds(located: Located) -> list[Site]:

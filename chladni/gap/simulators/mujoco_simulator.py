@@ -92,7 +92,8 @@ class MujocoSimulator:
         if values:
             # Masses enter constants that MuJoCo computes once.
             mujoco.mj_setConst(model, data)
-        _start(mujoco, model, data, self.keyframe)
+        if self.keyframe is not None:
+            mujoco.mj_resetDataKeyframe(model, data, index(model, "key", self.keyframe))
         steps = _steps(float(model.opt.timestep), sample_rate_hz)
         _require_commands(self.name, self.inputs, inputs, float(mujoco.mjMAXVAL))
         return _run(self, model, data, np.ascontiguousarray(inputs, dtype=np.float64), steps, joint_laws)
@@ -229,11 +230,6 @@ def _split(name: str) -> tuple[str, int | None]:
     if bracket and rest.endswith("]") and rest[:-1].isdecimal():
         return base, int(rest[:-1])
     return name, None
-
-
-def _start(mujoco: Any, model: Any, data: Any, keyframe: str | None) -> None:
-    if keyframe is not None:
-        mujoco.mj_resetDataKeyframe(model, data, index(model, "key", keyframe))
 
 
 def _steps(step_s: float, sample_rate_hz: float) -> int:

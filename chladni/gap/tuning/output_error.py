@@ -256,7 +256,8 @@ def _search(
     last = min(level + 2, DAMPINGS + 1) if problem.stale else DAMPINGS + 1
     for place in range(level, last):
         step = _step(problem, here, slopes, _damping(place))
-        expected = _expected(slopes, step)
+        # Nats that the step promises to gain.
+        expected = float(-(slopes.gradient @ step) - 0.5 * step @ slopes.curvature @ step)
         promised = min(promised, expected) if np.isfinite(promised) else expected
         try:
             # Initial states were eliminated without damping: they are held back as much.
@@ -278,11 +279,6 @@ def _step(problem: FitProblem, here: Evaluation, slopes: Slopes, damping: float)
     low = np.minimum(np.maximum(problem.low - here.point.x, -LONGEST), 0.0)
     high = np.maximum(np.minimum(problem.high - here.point.x, LONGEST), 0.0)
     return bounded_step(slopes.curvature, slopes.gradient, low, high, damping=damping)
-
-
-def _expected(slopes: Slopes, step: Real) -> float:
-    """Nats that a step promises to gain."""
-    return float(-(slopes.gradient @ step) - 0.5 * step @ slopes.curvature @ step)
 
 
 def _report(problem: FitProblem, here: Evaluation, slopes: Slopes, *, held: Mask) -> OutputErrorFit:
