@@ -33,7 +33,6 @@ class LawRunResult:
     outputs: Real
     before_maps: Real
     in_time: Real
-    setting: Setting
     compiled: CompiledModel
     equation: Equations
     records: tuple[March, ...]
@@ -45,7 +44,7 @@ def coarse_run(run: FreeRun, setting: Setting, initial: Real) -> LawRunResult:
     equation = run.equations(compiled, 1)
     starts = initial_states(initial, len(run.windows), len(compiled.states))
     marched = run_laws(equation, run.windows, starts, run.measurement.sample_rate_hz)
-    return _read(run, setting, compiled, equation, marched.outputs, marched.records)
+    return _read(run, compiled, equation, marched.outputs, marched.records)
 
 
 def fine_run(run: FreeRun, setting: Setting, initial: Real) -> LawRunResult:
@@ -56,27 +55,24 @@ def fine_run(run: FreeRun, setting: Setting, initial: Real) -> LawRunResult:
     if marched is not None:
         pairs = zip(run.windows, marched.records, strict=True)
         records = tuple(_at_samples(equation, window, record) for window, record in pairs)
-        return _read(run, setting, compiled, equation, marched.outputs, records)
+        return _read(run, compiled, equation, marched.outputs, records)
     made = run.integrations(setting.z, setting.effects, initial)
     records = recorded(equation, run.windows, made)
+    # An integrator reads between samples without a spline.
+    outputs = np.hstack([integration.outputs[run.rows] for integration in made])
     late = np.any(run.late_s(compiled))
     if not (compiled.output_maps or late):
-        outputs = np.hstack([integration.outputs[run.rows] for integration in made])
-        return LawRunResult(outputs, outputs, outputs, setting, compiled, equation, records)
+        return LawRunResult(outputs, outputs, outputs, compiled, equation, records)
     seen = [np.hstack([record.x, record.rows, record.force]) for record in records]
-    read = _read(run, setting, compiled, equation, np.hstack([equation.output @ one.T for one in seen]), records)
-    if late and len(run.windows) > 1:
-        return read
-    # An integrator reads between samples without a spline.
-    return replace(read, outputs=np.hstack([integration.outputs[run.rows] for integration in made]))
+    read = _read(run, compiled, equation, np.hstack([equation.output @ one.T for one in seen]), records)
+    return read if late and len(run.windows) > 1 else replace(read, outputs=outputs)
 
 
 def _read(
-    run: FreeRun, setting: Setting, compiled: CompiledModel, equation: Equations, in_time: Real,
-    records: tuple[March, ...],
-) -> LawRunResult:  # fmt: skip
+    run: FreeRun, compiled: CompiledModel, equation: Equations, in_time: Real, records: tuple[March, ...]
+) -> LawRunResult:
     before = read_late(in_time, run.late_s(compiled), run.measurement.sample_rate_hz)
-    return LawRunResult(_mapped(run, compiled, before), before, in_time, setting, compiled, equation, records)
+    return LawRunResult(_mapped(run, compiled, before), before, in_time, compiled, equation, records)
 
 
 def _at_samples(equation: Equations, window: tuple[int, int], record: March) -> March:
