@@ -48,6 +48,15 @@ def test_signals_are_those_of_the_telling_stretch(figures: dict[str, Figure], ev
         assert axes.get_title(loc="left") == signals.output_names[row]
 
 
+def test_a_map_without_colours_says_that_all_is_below_its_scale() -> None:
+    signals = made.signals()
+    quiet = replace(signals, gap_map_after=1e-9 * signals.gap_map)
+    before, after = gap_album(gap_evidence(replace(made.diagnosis(), signals=quiet))).figures["gap map"].axes[:2]
+    low = before.images[0].get_clim()[0]
+    assert after.get_title(loc="left") == f"Gap after · all of it below {low:.0f} dB"
+    assert "below" not in before.get_title(loc="left")
+
+
 def test_small_signals_and_errors_have_a_prefix_on_their_axes() -> None:
     signals = made.signals()
     small = replace(

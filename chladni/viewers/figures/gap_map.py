@@ -39,7 +39,12 @@ def _figure(signals: GapSignals, *, alone: bool) -> Figure:
     high = float(known.max()) if known.size else 0.0
     image = None
     # In one title: two on the same line would run into each other.
-    titles = [title for title, _ in maps]
+    low = high - DYNAMIC_RANGE_DB
+    # Of a good answer nothing is left that has a colour: black alone looks like no picture.
+    titles = [
+        title if np.any(level > low) else f"{title} · all of it below {low:.0f} dB"
+        for (title, _), level in zip(maps, levels, strict=True)
+    ]
     titles[0] = " · ".join(filter(None, (titles[0], band_told(signals))))
     for axes, level, title in zip(stack, levels, titles, strict=True):
         image = _draw(axes, signals, level, high)
