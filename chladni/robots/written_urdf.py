@@ -8,6 +8,7 @@ import numpy as np
 
 from chladni.robots.machine import about_centre, as_described
 from chladni.robots.mujoco_motion import gravity_of
+from chladni.signals.engineering import engineering
 
 if TYPE_CHECKING:
     import xml.etree.ElementTree as ET
@@ -45,9 +46,14 @@ class UrdfEdit:
             option = _child(_child(self._root, "mujoco"), "option")
             option.set("gravity", written(gravity_of(self._machine.robot.model, self._machine.tilt)))
         for each in self._machine.couplings:
-            shared = "a spring" if each.stiffness else "friction"
+            shared = (
+                ("a spring of", each.stiffness, "N m/rad"),
+                ("Coulomb friction of", each.friction, "N m"),
+                ("viscous friction of", each.damping, "N m s/rad"),
+            )
+            told = " and ".join(f"{what} {engineering(one, None, unit)}" for what, one, unit in shared if one)
             self.not_held.append(
-                f"{each.joints[0]} and {each.joints[1]}: {shared} that they share; URDF has none, MJCF has tendons"
+                f"{each.joints[0]} and {each.joints[1]} share {told}; URDF has no such thing, MJCF has tendons"
             )
         return False
 

@@ -78,7 +78,10 @@ def band_table(where: Where, *, least: float = 0.0) -> Table:
         for one in sorted(where.bands, key=lambda one: one.low_hz)
         if one.share >= least
     ]
-    return ("Band [Hz]", "Share", "of it noise"), rows
+    headings = ("Band [Hz]", "Share", "of it noise")
+    # Of torques nothing says how noise spreads over bands: a column of dashes tells nothing.
+    known = any(one.noise is not None for one in where.bands)
+    return (headings, rows) if known else (headings[:2], [row[:2] for row in rows])
 
 
 def site_title(found: Diagnosis, model: str = "What one site alone can explain") -> str:

@@ -200,10 +200,13 @@ def test_urdf_and_its_robot_file_move_as_the_machine_does(of_urdf: Machine, tmp_
 
 def test_what_urdf_lacks_is_told(of_urdf: Machine, tmp_path: Path) -> None:
     machine = changed(of_urdf, 1, armature=0.04, quadratic=0.1, stiffness=3.0, delay_s=0.02)
-    machine = replace(machine, couplings=(Coupling(joints=("shoulder", "elbow"), ratio=1.0, friction=0.5),))
+    machine = replace(
+        machine, couplings=(Coupling(joints=("shoulder", "elbow"), ratio=1.0, friction=0.5, damping=0.02),)
+    )
     told = write_robot(machine, tmp_path / "found.urdf").not_held
     assert len(told) == 5
-    for word in ("armature 0.04 kg m^2", "square of the speed", "a spring of 3", "share", "elbow 20 ms"):
+    shared = "shoulder and elbow share Coulomb friction of 0.5 N m and viscous friction of 20 mN m s/rad;"
+    for word in ("armature 0.04 kg m^2", "square of the speed", "a spring of 3", shared, "elbow 20 ms"):
         assert any(word in one for one in told)
 
 

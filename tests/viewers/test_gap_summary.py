@@ -418,6 +418,8 @@ def test_it_is_told_once_what_the_noise_was_estimated_from() -> None:
     )
     assert tables.noise_told(replace(where, channels=(replace(first, noise_from=""),))) is None
     assert [row[2] for row in tables.band_table(where)[1]] == ["40 %", "under 1 %", "–"]
+    torques = replace(where, bands=tuple(replace(one, noise=None) for one in where.bands))
+    assert tables.band_table(torques)[0] == ("Band [Hz]", "Share")
 
 
 def test_the_stretch_of_the_log_with_most_of_the_gap_comes_first() -> None:

@@ -14,6 +14,7 @@ from chladni.apps.robot_scene import robot_scene
 from chladni.gap.records.diagnosis import Diagnosis
 from chladni.gap.robots.diagnose import diagnose_robot
 from chladni.viewers.figures.gap import gap_album
+from chladni.viewers.figures.gap_sheet import gap_sheet
 from chladni.viewers.figures.robot import torque_map_figures
 from chladni.viewers.report.gap import gap_report_html
 from chladni.viewers.rerun.gap import write_gap_rrd
@@ -181,6 +182,30 @@ def test_a_robot_that_no_simulation_holds_is_drawn_as_measured(found: Diagnosis,
     assert not any(entity.startswith(("/robot/before", "/robot/after")) for entity in one.entities())
     assert "Measured; no simulation holds" in one.view_names()
     assert not gap_album(gap_evidence(alone)).sections["motion"]
+
+
+def test_errors_that_are_left_out_since_they_hide_others_are_told(found: Diagnosis) -> None:
+    assert found.motion is not None
+    astray = replace(found, motion=replace(found.motion, before=None))
+    (figure,) = gap_album(gap_evidence(astray)).sections["motion"].values()
+    (legend,) = figure.legends
+    assert [one.get_text() for one in legend.get_texts()] == [
+        "error before: more than the motion itself", "error after"
+    ]  # fmt: skip
+
+
+def test_a_sheet_says_all_that_was_found_of_a_robot(found: Diagnosis) -> None:
+    rubs = found.causes[0]
+    joints = tuple(
+        replace(rubs, site=f"joint_{place}", group=(f"joint_{place}",), parameters={
+            name: replace(one, value=one.value * 2**place) for name, one in rubs.parameters.items()
+        })
+        for place in range(6)
+    )  # fmt: skip
+    title = gap_sheet(gap_evidence(replace(found, causes=joints))).get_suptitle().replace("\n", " ")
+    for one in joints:
+        assert f"{one.site} " in title
+    assert "bring" in title
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from chladni.viewers.figures.sheet import SQUARE_IN, look, plain
 from chladni.viewers.gap_evidence import GapEvidence
 from chladni.viewers.gap_summary import caveats, summary
 from chladni.viewers.gap_tables import site_title, sites_named
+from chladni.viewers.robot_summary import robot_sentences
 
 # Of the summary, beside its caveats; the rest is in the report.
 SENTENCES, LETTERS = 2, 90
@@ -64,7 +65,11 @@ def save_gap_sheet(evidence: GapEvidence, path: Path) -> Path:
 
 def _told(found: Diagnosis) -> list[str]:
     """The answer, and all without which the sheet would look like more than was found."""
-    first = summary(found)[:SENTENCES]
+    count = SENTENCES
+    if found.machine is not None and found.verdict in ("effect", "parameters"):
+        # Each joint has a sentence of its own: the first alone would stand for all.
+        count = len(tuple(robot_sentences(found))) + 1
+    first = summary(found)[:count]
     return [*first, *(one for one in caveats(found) if one not in first)]
 
 

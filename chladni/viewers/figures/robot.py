@@ -118,17 +118,19 @@ def _residual(axes: Axes, signals: GapSignals, row: int, *, after: str) -> None:
 
 
 def _position_error(axes: Axes, motion: JointMotion, row: int, *, after: str) -> None:
-    courses = [
-        (one[row] - motion.measured[row], colour, width, label)
-        for one, colour, width, label in (
-            (motion.before, BEFORE, 0.9, "error before"),
-            (motion.after, AFTER, 0.7, f"error {after}"),
-        )
-        if one is not None
-    ]
-    scale, unit = axis_scale(np.concatenate([one for one, *_ in courses]), motion.units[row])
-    for values, colour, width, label in courses:
-        x, y = with_breaks(motion.time_s, values / scale, np.array(motion.gaps, dtype=np.intp) + 1)
+    courses = (
+        (motion.before, BEFORE, 0.9, "error before"),
+        (motion.after, AFTER, 0.7, f"error {after}"),
+    )
+    errors = [one[row] - motion.measured[row] for one, *_ in courses if one is not None]
+    scale, unit = axis_scale(np.concatenate(errors), motion.units[row])
+    for simulated, colour, width, label in courses:
+        if simulated is None:
+            # Drawn it would hide the other; a legend without it would leave open why.
+            axes.plot([], [], color=colour, linewidth=width, label=f"{label}: more than the motion itself")
+            continue
+        values = (simulated[row] - motion.measured[row]) / scale
+        x, y = with_breaks(motion.time_s, values, np.array(motion.gaps, dtype=np.intp) + 1)
         chosen, _ = thin(y, limit=POINTS)
         axes.plot(x[chosen], y[chosen], color=colour, linewidth=width, label=label)
     axes.set_xlim(motion.time_s[0], motion.time_s[-1])
