@@ -70,7 +70,7 @@ def _second_trials(
 
 def _beside(found: Contestant, kept: tuple[AttachedEffect, ...], one: Hypothesis, z: Real) -> Hypothesis:
     """Another effect beside those of a fit that are kept."""
-    return hypothesis_of((*kept, *one.effects), z, screened=one.screened, initial=found.fit.initial)
+    return hypothesis_of((*kept, *one.effects), z, initial=found.fit.initial)
 
 
 def paired_causes(study: Study, best: Contestant) -> Entered:
@@ -129,12 +129,7 @@ def without_one(study: Study, both: Contestant) -> list[Contestant]:
     """Enter each effect of several without one of the others, started from their common fit."""
     effects = both.fit.effects
     fewer = [
-        hypothesis_of(
-            (*effects[:place], *effects[place + 1 :]),
-            both.fit.z,
-            screened=both.hypothesis.screened,
-            initial=both.fit.initial,
-        )
+        hypothesis_of((*effects[:place], *effects[place + 1 :]), both.fit.z, initial=both.fit.initial)
         for place in range(len(effects))
         if len(effects) > 1
     ]

@@ -7,13 +7,13 @@ import numpy as np
 from chladni.gap.calibration import NEAR, ONE_FORCE, SAME
 from chladni.gap.diagnosis.following import is_lost_beside
 from chladni.gap.diagnosis.study import Study
+from chladni.gap.explanation.hypotheses import fitted_form
 from chladni.gap.explanation.hypothesis import Contestant
-from chladni.gap.explanation.trial import excited_band_hz
 from chladni.gap.location.locate import Located, Location
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.side_by_side import side_by_side
 from chladni.models.effects.attached_effect import AttachedEffect
-from chladni.models.effects.clues import FittedForm
+from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
 
@@ -83,15 +83,12 @@ def is_another(run: FreeRun, found: Contestant, effect: AttachedEffect) -> bool:
     judge = effect.kind.clues.is_degenerate
     if judge is None:
         return False
-    fitted = FittedForm(
-        variant=effect.variant,
-        values=effect.values,
-        duration_s=run.measurement.duration_s,
-        band_hz=excited_band_hz(run.measurement),
-        motion=lambda: run.law_motion(found.fit.z, found.fit.effects, found.fit.initial, site=effect.site),
-    )
+
+    def motion() -> tuple[Real, Real]:
+        return run.law_motion(found.fit.z, found.fit.effects, found.fit.initial, site=effect.site)
+
     try:
-        return judge(fitted)
+        return judge(fitted_form(run, effect, motion))
     except ModelError:
         # A run that diverges shows no law at work.
         return True

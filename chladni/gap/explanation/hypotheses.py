@@ -43,17 +43,15 @@ def effect_hypotheses(screened: Sequence[Screened], *, count: int) -> list[Hypot
         if effect is None:
             continue
         seen[key] = seen.get(key, 0) + 1
-        found.append(hypothesis_of((effect,), one.z, screened=one.chi))
+        found.append(hypothesis_of((effect,), one.z))
         last = max(last, one.chi) if len(found) <= count else last
     return found
 
 
-def hypothesis_of(
-    effects: tuple[AttachedEffect, ...], z: Real, *, screened: float | None = None, initial: Real | None = None
-) -> Hypothesis:
+def hypothesis_of(effects: tuple[AttachedEffect, ...], z: Real, *, initial: Real | None = None) -> Hypothesis:
     """Give the hypothesis that these effects act."""
     fitted = tuple(effect.usually_fitted for effect in effects)
-    return Hypothesis(effects=effects, fitted=fitted, start_z=z, screened=screened, initial=initial)
+    return Hypothesis(effects=effects, fitted=fitted, start_z=z, initial=initial)
 
 
 def effect_of(one: Screened) -> AttachedEffect | None:
@@ -77,12 +75,8 @@ def little_of(effect: AttachedEffect, site: str) -> AttachedEffect:
 
 def siblings(found: Contestant, run: FreeRun) -> list[Hypothesis]:
     """Give the effects that contain one of a fit or that it contains, begun where it ended: nested laws compete."""
-    fit, hypotheses = found.fit, []
-    for place, one in enumerate(fit.effects):
-        for other in _nested(found, run, one):
-            effects = (*fit.effects[:place], other, *fit.effects[place + 1 :])
-            hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened, initial=fit.initial))
-    return hypotheses
+    effects = found.fit.effects
+    return [_instead(found, place, other) for place, one in enumerate(effects) for other in _nested(found, run, one)]
 
 
 def twins(found: Contestant, places: Iterable[Place]) -> list[Hypothesis]:
@@ -91,13 +85,25 @@ def twins(found: Contestant, places: Iterable[Place]) -> list[Hypothesis]:
     A force that follows a joint's way may as well come from the input that acts across it. At an input it pushes
     where at a joint it resists: half a turn of a phase is the other sign, both are tried.
     """
-    fit, hypotheses = found.fit, []
-    places = list(places)
-    for number, one in enumerate(fit.effects):
-        for moved in _moved(one, places):
-            effects = (*fit.effects[:number], moved, *fit.effects[number + 1 :])
-            hypotheses.append(hypothesis_of(effects, fit.z, screened=found.hypothesis.screened, initial=fit.initial))
-    return hypotheses
+    places, effects = list(places), found.fit.effects
+    return [_instead(found, number, moved) for number, one in enumerate(effects) for moved in _moved(one, places)]
+
+
+def _instead(found: Contestant, place: int, other: AttachedEffect) -> Hypothesis:
+    """Another effect in the place of one of a fit."""
+    fit = found.fit
+    return hypothesis_of((*fit.effects[:place], other, *fit.effects[place + 1 :]), fit.z, initial=fit.initial)
+
+
+def fitted_form(run: FreeRun, effect: AttachedEffect, motion: Callable[[], tuple[Real, Real]]) -> FittedForm:
+    """Give an effect of a fit as its own file judges it, with the motion at its site."""
+    return FittedForm(
+        variant=effect.variant,
+        values=effect.values,
+        duration_s=run.measurement.duration_s,
+        band_hz=excited_band_hz(run.measurement),
+        motion=motion,
+    )
 
 
 def _moved(effect: AttachedEffect, places: Sequence[Place]) -> Iterator[AttachedEffect]:
@@ -121,15 +127,8 @@ def _nested(found: Contestant, run: FreeRun, one: AttachedEffect) -> list[Attach
         there = run.motion(found.fit.z, found.fit.effects, site=one.site)
         return there.displacement, there.velocity
 
-    fitted = FittedForm(
-        variant=one.variant,
-        values=one.values,
-        duration_s=run.measurement.duration_s,
-        band_hz=excited_band_hz(run.measurement),
-        motion=motion,
-    )
     try:
-        forms = list(nested(fitted))
+        forms = list(nested(fitted_form(run, one, motion)))
     except ModelError:
         return []
     others = [attached_if_possible(form.effect, one.site, form.values, variant=form.variant) for form in forms]

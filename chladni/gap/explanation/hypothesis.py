@@ -23,8 +23,6 @@ class Hypothesis:
         For each effect the names of the parameters that move.
     freed
         Names of parameters whose value may be wrong.
-    screened
-        Misfit over noise of the screen, None when it wasn't screened.
     initial
         ``[window, state]`` where the states of the model without these effects start, None when nothing tells.
     """
@@ -33,7 +31,6 @@ class Hypothesis:
     fitted: tuple[tuple[str, ...], ...] = ()
     freed: tuple[str, ...] = ()
     start_z: Real
-    screened: float | None = None
     initial: Real | None = None
 
     @property

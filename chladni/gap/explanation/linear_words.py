@@ -57,7 +57,7 @@ def linear_hypotheses(
     effects = [effect for one in worth if (effect := effect_of(one)) is not None and effect.kind.linear]
     found = [fitted_beside(model, location, effect, there[effect.site].profile.z) for effect in effects[:count]]
     ranked = sorted((one for one in found if one is not None), key=lambda one: one.chi)
-    return [hypothesis_of((one.effect,), one.z, screened=one.chi) for one in ranked[:FORMS]]
+    return [hypothesis_of((one.effect,), one.z) for one in ranked[:FORMS]]
 
 
 def _starts(effect: AttachedEffect) -> list[AttachedEffect]:
@@ -122,7 +122,7 @@ def linear_elsewhere(
     scores = _Scores(model, location.problem, location.tuned)
     enough = min([LESS * location.tuned.chi, *(UNLIKELY * one.chi for one in screened)])
     found = _promised(scores, location, kinds, followed | scores.open_ended, enough)
-    return [hypothesis_of((one.effect,), one.z, screened=one.chi) for one in found]
+    return [hypothesis_of((one.effect,), one.z) for one in found]
 
 
 def linear_beside(
@@ -143,7 +143,7 @@ def linear_beside(
     problem = LinearProblem(beside, old.measurement, old.noise, old.tunables, old.lines)
     scores = _Scores(beside, problem, profiled(problem, (), z))
     found = _promised(scores, location, kinds, {one.site for one in kept}, enough)
-    return [hypothesis_of((*kept, one.effect), one.z, screened=one.chi) for one in found]
+    return [hypothesis_of((*kept, one.effect), one.z) for one in found]
 
 
 def _promised(

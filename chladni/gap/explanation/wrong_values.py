@@ -36,7 +36,7 @@ def wrong_values(location: Location, tunables: Tunables) -> list[Hypothesis]:
     which forgive a resonance that lies elsewhere; the best is freed, and the next one looked for beside it.
     """
     found = _selected(location, tunables, location.tuned, ())
-    return [Hypothesis(start_z=one.profile.z, screened=one.profile.chi) for one in found]
+    return [Hypothesis(start_z=one.profile.z) for one in found]
 
 
 def with_wrong_values(location: Location, located: Located, tunables: Tunables) -> Located | None:

@@ -6,7 +6,7 @@ import chladni
 from chladni.gap.comparison.noise_estimate import estimate_noise
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.explanation.candidates import screened
-from chladni.gap.explanation.linear_words import linear_beside, linear_elsewhere, linear_hypotheses
+from chladni.gap.explanation.linear_words import fitted_beside, linear_beside, linear_elsewhere, linear_hypotheses
 from chladni.gap.location.locate import locate
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
@@ -37,7 +37,7 @@ def test_a_heavy_load_is_found_beside_the_parameters(
     best = next(one for one in found if one.effects[0].effect == word)
     # Noise of 0.3 % beside as much that a floor grants to any law is half of the floor, less what ten numbers take of
     # 1500 lines: 0.497, with a spread of 0.013 for one sensor.
-    assert 0.45 < best.screened < 1.1
+    assert 0.45 < fitted_beside(arm(), location, best.effects[0], best.start_z).chi < 1.1
     assert best.effects[0].site == site
     # Parameters of the machine are off, by three per cent each: masses are known no better.
     assert best.effects[0].values["mass"] == pytest.approx(values["mass"], rel=0.05)
@@ -59,7 +59,7 @@ def test_a_coupling_that_is_no_force_at_any_one_place_is_found_by_its_first_step
     (effect,) = best.effects
     assert (effect.effect, effect.site) == ("gyroscopic", "column~wrist")
     assert effect.values["coefficient"] == pytest.approx(60.0, rel=0.05)
-    assert best.screened < 1.1
+    assert fitted_beside(arm(), location, effect, best.start_z).chi < 1.1
 
 
 def test_nothing_is_fitted_elsewhere_where_the_model_is_right() -> None:
