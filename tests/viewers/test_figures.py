@@ -27,7 +27,7 @@ from chladni.viewers.figures import (
     waterfall_figures,
     waveform_figures,
 )
-from chladni.viewers.figures.log_axis import Scales, power_of_ten
+from chladni.viewers.figures.log_axis import Scales, logarithmic, power_of_ten
 from chladni.viewers.figures.peak_labels import LABELS, label_peaks
 from chladni.viewers.figures.rendering import rendered
 from chladni.viewers.figures.sheet import plain
@@ -355,6 +355,16 @@ def test_a_character_without_a_glyph_is_marked_not_warned_about() -> None:
 )
 def test_powers_of_ten_are_printed(value: float, text: str) -> None:
     assert power_of_ten(value) == text
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "told"), [(2e-3, 2.0, ["0.01", "0.1", "1"]), (2e-4, 2.0, ["10⁻³", "10⁻²", "0.1", "1"])]
+)
+def test_an_axis_that_needs_no_powers_of_ten_has_none(low: float, high: float, told: list[str]) -> None:
+    axes = Figure().add_subplot()
+    logarithmic(axes, low, high)
+    inside = [one for one in axes.yaxis.get_majorticklocs() if low <= one <= high]
+    assert [axes.yaxis.get_major_formatter()(one) for one in inside] == told
 
 
 @pytest.mark.slow

@@ -164,6 +164,7 @@ def test_many_joints_share_a_sheet_and_more_have_several(found: Diagnosis) -> No
 
 def test_the_report_begins_with_the_torque_that_is_missing(found: Diagnosis) -> None:
     page = gap_report_html(gap_evidence(found), interactive=False)
+    assert "creep_speed" not in page
     assert page.index("Torque that is missing") < page.index("Answer")
     assert page.index("<img") < page.index("Answer")
 

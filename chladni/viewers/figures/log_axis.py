@@ -13,6 +13,8 @@ from chladni.signals.arrays import Mask, Real
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 # Over fewer decades than this, powers of ten alone are too few numbers.
 FEW_DECADES = 2.0
+# An axis between these has no powers of ten: its numbers are as short.
+PLAIN_FROM, PLAIN_TO = 1e-3, 1e4
 # Over fewer decibels, steps of ten are too few numbers.
 FEW_DECIBELS = 40.0
 
@@ -91,7 +93,7 @@ def power_of_ten(value: float) -> str:
     ('10⁻³', '1', '100')
     """
     exponent = round(log10(value))
-    if -2 <= exponent <= 3:
+    if -1 <= exponent <= 3:
         return f"{10.0**exponent:g}"
     return "10" + str(exponent).translate(_SUPERSCRIPTS)
 
@@ -124,7 +126,9 @@ def logarithmic(axes: Axes, low: float, high: float, *, numbers: int = 7) -> Non
     axes.set_ylim(low, high)
     axis = axes.yaxis
     axis.set_major_locator(LogLocator(numticks=numbers))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    # Both ways of writing on one axis read badly.
+    plain = low >= PLAIN_FROM and high <= PLAIN_TO
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}" if plain else power_of_ten(value)))
     few = log10(high / low) < FEW_DECADES
     minor = LogLocator(subs=(2.0, 5.0) if few else tuple(range(2, 10)), numticks=12)
     # Marks of so many decades that not each of them has its number would run into one bar.

@@ -163,7 +163,9 @@ def _answer(found: Diagnosis) -> str:
 
 def _causes(found: Diagnosis) -> str:
     # Effects of somebody's own have no law here; joints that rub alike share one.
-    laws = dict.fromkeys(law for law in map(cause_law, found.causes) if law)
+    # A robot's laws are those of docs/robots.md, without the details that models need.
+    causes = found.causes if found.machine is None else ()
+    laws = dict.fromkeys(law for law in map(cause_law, causes) if law)
     return _tables((tables.cause_table(found), (3,))) + _list(tuple(laws))
 
 
