@@ -55,7 +55,7 @@ def response_comparison() -> ResponseComparison:
 
 
 def marked_hz(axes: Axes) -> list[float]:
-    (line,) = [line for line in axes.lines if line.get_label() == "more than scatter explains"]
+    (line,) = [line for line in axes.lines if line.get_label() == "in colour: more than scatter explains"]
     x, y = (np.asarray(points, dtype=np.float64) for points in (line.get_xdata(), line.get_ydata()))
     return x[np.isfinite(y)].tolist()
 

@@ -118,7 +118,7 @@ def _draw_significant(
     """Colour the curve where it differs; thousands of dots on it would hide it."""
     coloured = np.where(significant, change_db, np.nan)
     x, y = with_breaks(frequency_hz, coloured, line_breaks(frequency_hz))
-    axes.plot(x, y, color=colour, linewidth=0.8, label="more than scatter explains", zorder=3)
+    axes.plot(x, y, color=colour, linewidth=0.8, label="in colour: more than scatter explains", zorder=3)
     # A line alone among others would have no length.
     beside = np.convolve(significant, [1, 0, 1], mode="same") > 0
     alone = significant & ~beside
