@@ -1,5 +1,6 @@
 """The first page: all instruments."""
 
+import re
 from collections.abc import Iterable
 from dataclasses import replace
 from html import escape
@@ -57,11 +58,12 @@ def index_page(instruments: Iterable[Instrument]) -> str:
 
 
 def _small(instrument: Instrument) -> str:
-    title, _, rest = instrument.title.partition(", ")
-    return _card(replace(instrument, title=title), rest)
+    # A name, then what it is or its transfer function.
+    title, *rest = re.split(r"[,:] ", instrument.title, maxsplit=1)
+    return _card(replace(instrument, title=title), *rest)
 
 
-def _card(instrument: Instrument, words: str) -> str:
+def _card(instrument: Instrument, words: str = "") -> str:
     return (
         f'<li><a href="/{escape(instrument.name)}"><b>{escape(instrument.title)}</b>'
         f"<span>{escape(words)}</span></a></li>"

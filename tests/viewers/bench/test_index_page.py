@@ -19,3 +19,5 @@ def test_many_of_one_kind_stand_apart() -> None:
     assert text.index("/oscillator") < text.index("<h2>Elements</h2>") < text.index("/element-0")
     assert "<b>E0</b><span>a&lt;b</span>" in text
     assert "<h2>" not in index_page(elements[:-1])
+    formula = [replace(one, title="Notch: K (s + 1)/s, w = 2 pi f") for one in elements]
+    assert "<b>Notch</b><span>K (s + 1)/s, w = 2 pi f</span>" in index_page(formula)
