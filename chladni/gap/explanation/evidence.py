@@ -12,7 +12,7 @@ from chladni.gap.location.profile import Elimination, Profile
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.linear_view import View
-from chladni.gap.plant.places import sites_of, way_to
+from chladni.gap.plant.places import printed_alike, sites_of, way_to
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.effect_scale import effect_numbers
 from chladni.gap.tuning.output_error import OutputErrorFit
@@ -30,11 +30,11 @@ class Left:
     across, across_expected
         The rest.
     force
-        Energy along the same that the model with the fit's parameters leaves without those laws.
+        Energy along the same that the fit leaves without those laws: its parameters and linear words beside them.
     doubt
         Share of the expected energy that the noise is uncertain by.
     sites
-        Of laws with details: each differs from the machine's in its own way.
+        Of laws with details, or places where these print alike: each differs from the machine's in its own way.
     outputs
         Energy of each output over what noise leaves there; empty where outputs aren't told apart.
     along_outputs
@@ -167,26 +167,28 @@ def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed:
     measurement, lines = problem.measurement, problem.lines
     weight = problem.weight
     linear = tuple(one for one in fit.effects if one.kind.linear)
-    view, plain = (problem.beside(fit.z, run.compiled(fit.z, effects)) for effects in (linear, ()))
+    # What an exact word beside them explains is no force of theirs, of which details could be a share.
+    exact = tuple(one for one in linear if one.kind.clues.exact)
+    view, plain = (problem.beside(fit.z, run.compiled(fit.z, effects)) for effects in (linear, exact))
     missed = measurement.outputs - fit.outputs
     missed[:, : run.unknown_at_start(fit.z, fit.effects)] = 0.0
     residual = lines.spectrum(missed) * weight
     missing = np.asarray((problem.measured - plain.forced()) * weight, dtype=np.complex128)
     (along, across), out = _split(view, measurement.output_names, detailed, weight, residual)
     (force, _), without = _split(plain, measurement.output_names, detailed, weight, missing)
-    count, sensors, sites = lines.index.size, len(measurement.output_names), min(len(set(detailed)), len(residual))
+    count, taken = lines.index.size, sum(out.taken)
     return Left(
         along=along,
-        along_expected=float(sites * count),
+        along_expected=taken,
         across=across,
-        across_expected=float((sensors - sites) * count),
+        across_expected=max(float(residual.size) - taken, 0.0),
         force=force,
         doubt=doubt_of(problem.noise),
-        sites=len(set(detailed)),
+        sites=out.count,
         outputs=tuple((np.sum(np.abs(residual) ** 2, axis=(1, 2)) / count).tolist()),
         along_outputs=out.taken,
-        own=_shares(out.own(residual), along, sites * count),
-        own_force=_shares(without.own(missing), force, sites * count),
+        own=_shares(out.own(residual), along, taken),
+        own_force=_shares(without.own(missing), force, taken),
     )
 
 
@@ -222,7 +224,9 @@ def _split(
 ) -> tuple[tuple[float, float], Elimination]:
     """Energy along the forces at some sites, and the rest; what takes them."""
     sites = [site for site in sites_of(view.compiled, outputs) if site.name in names]
-    patterns = [view.pattern(way_to(view, site, outputs))[:, None] * weight for site in sites]
+    printed = [view.pattern(way_to(view, site, outputs))[:, None] * weight for site in sites]
+    # Laws that print alike leave the details of one force: nothing tells whose they are.
+    patterns = [printed[alike[0]] for alike in printed_alike(printed, view.rounding)]
     transients = view.transients()[:, :, None] * weight
     plain, out = (Elimination(some, transients) for some in ([], patterns))
     whole, across = (float(np.sum(one.rest(residual) ** 2)) for one in (plain, out))

@@ -68,6 +68,8 @@ class Projection:
 
     def __init__(self, patterns: Sequence[Complex]) -> None:
         self._unit = _orthonormal(patterns)
+        #: Of the forces.
+        self.count = len(self._unit)
 
     @property
     def taken(self) -> tuple[float, ...]:

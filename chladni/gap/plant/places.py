@@ -1,6 +1,6 @@
 """Places: the sites of a model, put together where a force would print the same pattern on these sensors."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,19 +77,33 @@ def placed(view: View, sites: Sequence[Site], outputs: Sequence[str], noise: Noi
     its numbers.
     """
     acting = [site for site in sites if not _is_motion(view.compiled, site)]
-    found: list[tuple[list[Site], Complex]] = []
-    for site, printed in zip(acting, printed_patterns(view, acting, outputs, noise), strict=True):
+    groups = printed_alike(printed_patterns(view, acting, outputs, noise), view.rounding)
+    return tuple(Place(sites=tuple(acting[number] for number in group)) for group in groups)
+
+
+def printed_alike(patterns: Iterable[Complex], rounding: float) -> list[list[int]]:
+    """Put numbers of patterns ``[output, ..., line]`` together that are proportional on every line.
+
+    One that prints nothing is left out.
+
+    Parameters
+    ----------
+    rounding
+        Share of their energy by which equal ones may differ.
+    """
+    found: list[tuple[list[int], Complex]] = []
+    for number, printed in enumerate(patterns):
         size = np.sqrt(np.sum(np.abs(printed) ** 2, axis=0))
         if not np.any(size > 0):
             continue
         unit = printed / np.where(size > 0, size, 1.0)
         for group, known in found:
-            if np.mean(np.abs(np.sum(known.conj() * unit, axis=0)) ** 2) > 1 - view.rounding:
-                group.append(site)
+            if np.mean(np.abs(np.sum(known.conj() * unit, axis=0)) ** 2) > 1 - rounding:
+                group.append(number)
                 break
         else:
-            found.append(([site], unit))
-    return tuple(Place(sites=tuple(group)) for group, _ in found)
+            found.append(([number], unit))
+    return [group for group, _ in found]
 
 
 def _is_motion(compiled: CompiledModel, site: Site) -> bool:

@@ -134,16 +134,20 @@ def test_laws_whose_details_work_against_each_other_are_not_excused_by_the_force
     assert replace(NOISE, sites=2, own=(40.0, 60.0)).log_likelihood == 0.0
 
 
-@pytest.fixture(scope="module")
-def sprung():
-    """Three bodies with a spring between two of them that hardens, beside the fit that knows of none."""
+def beside_a_spring(*known):
+    """Three bodies with a spring between two of them that hardens, beside the fit that knows of all but that."""
     spring = attached("hardening_stiffness", "j1", {"cubic": 2e12})
-    log, floor = measured(three_bodies().with_effects((spring,)), band_noise(4096, rms=150.0), noise=0.01)
+    log, floor = measured(three_bodies().with_effects((spring, *known)), band_noise(4096, rms=150.0), noise=0.01)
     run = FreeRun(three_bodies(), log)
     problem = problem_of(run, floor)
     contest = Contest(run, problem, training_mask(log.samples, log.sample_rate_hz))
-    fit = contest.enter(Hypothesis(start_z=np.zeros(len(run.tunables.names))), tune=False).fit
+    fit = contest.enter(Hypothesis(effects=known, start_z=np.zeros(len(run.tunables.names))), tune=False).fit
     return problem, run, fit
+
+
+@pytest.fixture(scope="module")
+def sprung():
+    return beside_a_spring()
 
 
 def test_a_force_at_a_site_prints_along_it_and_nowhere_else(sprung) -> None:
@@ -156,6 +160,19 @@ def test_a_force_at_a_site_prints_along_it_and_nowhere_else(sprung) -> None:
     assert elsewhere.across > 10.0 * elsewhere.across_expected
 
 
+def test_what_an_exact_word_explains_is_no_force_of_a_law_beside_it() -> None:
+    # A gain of three makes a sensor miss twice its signal: of that no details of a spring are a share.
+    there = left_of(*beside_a_spring(attached("gain_error", "a1", {"gain": 3.0})), ["j1"])
+    assert there.force == pytest.approx(there.along, rel=0.02)
+
+
+def test_laws_that_print_alike_leave_the_details_of_one_force(sprung) -> None:
+    # Between the ground and the first body, and at that body: sensors feel the same.
+    one, both = (left_of(*sprung, sites) for sites in (["j0"], ["j0", "b0"]))
+    assert both == one
+    assert left_of(*sprung, ["j0", "j1"]).sites == 2
+
+
 def test_what_is_left_is_split_without_a_rest(sprung) -> None:
     lines, sensors = sprung[0].lines.index.size, 3
     whole = left_of(*sprung, [])
@@ -163,8 +180,8 @@ def test_what_is_left_is_split_without_a_rest(sprung) -> None:
     for sites in (["j1"], ["j0", "j2"], ["j0", "j1", "j2"]):
         parts = left_of(*sprung, sites)
         assert parts.along + parts.across == pytest.approx(whole.across)
-        assert parts.along_expected == len(sites) * lines
-        assert parts.along_expected + parts.across_expected == sensors * lines
+        assert parts.along_expected == pytest.approx(len(sites) * lines)
+        assert parts.along_expected + parts.across_expected == pytest.approx(sensors * lines)
 
 
 def fit_of(covariance: np.ndarray, *effects) -> SimpleNamespace:
