@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -16,7 +17,7 @@ from chladni.signals.arrays import Mask, Real
 from chladni.spectral.filters import channel_runs
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Yardstick:
     """What simulations of a log are held against.
 
@@ -52,7 +53,7 @@ class Yardstick:
             return None
         return max(stop - start for start, stop in self.windows) / self.measurement.sample_rate_hz
 
-    @property
+    @cached_property
     def floor(self) -> float:
         """The noise over the RMS of what was measured, outputs pooled."""
         measured = self.measurement.outputs[:, self.held]

@@ -43,7 +43,11 @@ def view_slopes(
     rows = np.concatenate(signals)
     by_step, through = _coefficients(view, changed, step, forces)
     drive = along(by_step.reshape(count * n, rows.shape[0]), rows).reshape(count, n, *rows.shape[1:])
-    found = np.einsum("nol,pnsl->posl", view.printed, drive, optimize=False)
+    # A product a line: BLAS takes a third of the time that a sum over indices does.
+    segments, lines = drive.shape[2:]
+    by_line = drive.transpose(3, 1, 0, 2).reshape(lines, n, count * segments)
+    found = view.printed.transpose(2, 1, 0) @ by_line
+    found = found.reshape(lines, len(view.rows), count, segments).transpose(2, 1, 3, 0)
     moved = np.flatnonzero(np.any(through != 0, axis=(1, 2)))
     if moved.size:
         direct = along(through[moved].reshape(-1, rows.shape[0]), rows)
