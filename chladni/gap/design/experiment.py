@@ -33,8 +33,6 @@ class Experiment(Value):
         With the inputs where they act in this experiment.
     inputs
         ``[input, sample]``, SI.
-    level
-        Times the log's own inputs; None when they take another course.
     start
         Times the initial states of the log; 0 from rest.
     repeats
@@ -47,7 +45,6 @@ class Experiment(Value):
     words: str
     model: Model
     inputs: Real
-    level: float | None = None
     start: float = 0.0
     repeats: int = 1
     further: float = 0.0

@@ -42,10 +42,10 @@ class Reach:
         """Highest frequency that is asked for."""
         return self.measurement.sample_rate_hz / SAMPLES_A_CYCLE
 
-    def experiment(self, change: Change, words: str, inputs: Real, *, level: float | None = None) -> Experiment:
-        """Give an experiment on the model as it is."""
-        start = level if level is not None and self.begins_with_log else 0.0
-        return Experiment(change=change, words=words, model=self.model, inputs=inputs, level=level, start=start)
+    def experiment(self, change: Change, words: str, inputs: Real, *, level: float = 0.0) -> Experiment:
+        """Give an experiment on the model as it is, with the log's own inputs at a level, or others."""
+        start = level if self.begins_with_log else 0.0
+        return Experiment(change=change, words=words, model=self.model, inputs=inputs, start=start)
 
     def as_logged(self) -> Experiment:
         """Give the experiment that the log is."""

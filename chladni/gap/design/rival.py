@@ -9,7 +9,7 @@ from chladni.gap.calibration import LONGEST, PROFILE_STEPS, ROUNDING, STEP
 from chladni.gap.explanation.hypothesis import Contestant
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.law_plant import Setting, around, differences, fine_run, slopes_of
-from chladni.gap.plant.linear_run import can_run, decay
+from chladni.gap.plant.linear_run import decay, is_plain
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.noise_floor import NoiseFloor
 from chladni.gap.tuning.bounded_step import bounded_step
@@ -68,7 +68,7 @@ class Rival:
         x = np.zeros(self.unknowns) if at is None else at
         here, changed = self._setting(x), around(self._setting, x, self._steps(x))
         compiled = run.compiled(here.z, here.effects)
-        if can_run(compiled):
+        if not is_plain(compiled):
             made = fine_run(run, here, initial)
             return Prediction(made.outputs, *slopes_of(run, made, changed))
         outputs = run.outputs(here.z, here.effects, initial)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -136,15 +135,10 @@ class Contest:
         return float(0.5 * added * np.log(max(EFFECTIVE_SAMPLES / windows, 2.0)))
 
     def enter_all(
-        self,
-        hypotheses: Sequence[Hypothesis],
-        progress: Callable[[float], None] | None = None,
-        *,
-        max_iterations: int = ITERATIONS,
+        self, hypotheses: Sequence[Hypothesis], progress: Callable[[float], None] | None = None
     ) -> list[Contestant]:
         """Fit hypotheses, and give them in their order; those that diverge are left out."""
-        enter = partial(self.enter, max_iterations=max_iterations)
-        return [one for one in side_by_side(enter, hypotheses, progress) if one is not None]
+        return [one for one in side_by_side(self.enter, hypotheses, progress) if one is not None]
 
 
 def held_gap(measured: Real, simulated: Real, held: Mask) -> float:

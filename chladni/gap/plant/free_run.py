@@ -10,7 +10,7 @@ from chladni.gap.calibration import KEPT, PARTS, UNNOTICED
 from chladni.gap.plant.black_box import BlackBox, Response
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.laid_inputs import LaidInputs
-from chladni.gap.plant.linear_run import LinearRuns, can_run, is_plain
+from chladni.gap.plant.linear_run import is_plain, linear_outputs
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
@@ -63,7 +63,6 @@ class FreeRun:
         compiled = model.compile()
         self.rows = _rows(compiled, measurement)
         self.inputs = LaidInputs(measurement.inputs, measurement.sample_rate_hz)
-        self._linear = LinearRuns(self.inputs)
         self._integrators: Kept[Integrator] = Kept(KEPT)
 
     def compiled(self, z: Real | None = None, effects: Sequence[Effect] = ()) -> CompiledModel:
@@ -128,7 +127,7 @@ class FreeRun:
         rate = self.measurement.sample_rate_hz
         if is_plain(compiled):
             starts = initial_states(initial, len(self.windows), len(compiled.states))
-            found = self._linear.outputs(compiled, self.rows, self.windows, starts)
+            found = linear_outputs(self.inputs, compiled, self.rows, self.windows, starts)
             return mapped_outputs(compiled, self.rows, found, rate)
         marched = self.marched(compiled, initial)
         if marched is not None:
@@ -141,7 +140,7 @@ class FreeRun:
         rate = self.measurement.sample_rate_hz
         hold = hold_of(compiled, rate)
         # An integrator counts time from the start of its own window; a law may want the log's.
-        if len(self.windows) == 1 or not compiled.laws or not can_run(compiled):
+        if len(self.windows) == 1 or not compiled.laws:
             return None
         if compiled.delays or hold.kinked.size or any(terminal.derivatives for terminal in compiled.inputs):
             return None

@@ -1,11 +1,11 @@
 """Inputs of one log as rows of steps, laid out once for all models that take them alike."""
 
 from math import factorial
-from threading import Lock
 
 import numpy as np
 
 from chladni.gap.calibration import KEPT
+from chladni.gap.plant.kept import Kept
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.hold import Hold
 from chladni.models.integrator.input_rows import input_rows
@@ -21,8 +21,7 @@ class LaidInputs:
 
     def __init__(self, signals: Real, sample_rate_hz: float) -> None:
         self._signals, self.sample_rate_hz = signals, sample_rate_hz
-        self._kept: list[tuple[object, Real]] = []
-        self._lock = Lock()
+        self._kept: Kept[Real] = Kept(KEPT)
 
     def rows(self, compiled: CompiledModel, hold: Hold, parts: int = 1) -> Real:
         """Give ``[step, width]``; the same array for models that take the inputs alike.
@@ -40,16 +39,11 @@ class LaidInputs:
         key = (
             compiled.inputs, compiled.input_maps, compiled.input_delays_s, compiled.generated, hold.width, parts,
         )  # fmt: skip
-        with self._lock:
-            for place, (known, rows) in enumerate(self._kept):
-                if known == key:
-                    self._kept.append(self._kept.pop(place))
-                    return rows
+        return self._kept.get(key, lambda: self._laid(compiled, hold, parts))
+
+    def _laid(self, compiled: CompiledModel, hold: Hold, parts: int) -> Real:
         rows = input_rows(compiled, hold, self._signals, self.sample_rate_hz, extra=0)
-        made = _finer(rows, hold, parts, 1.0 / self.sample_rate_hz)
-        with self._lock:
-            self._kept = [*self._kept[1 - KEPT :], (key, made)]
-        return made
+        return _finer(rows, hold, parts, 1.0 / self.sample_rate_hz)
 
 
 def _finer(rows: Real, hold: Hold, parts: int, step_s: float) -> Real:

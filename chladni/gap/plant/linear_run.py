@@ -8,55 +8,52 @@ from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.models.core.balance import balance
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.integrator.exponential import responses
-from chladni.models.integrator.hold import hold_of
+from chladni.models.integrator.hold import Hold, hold_of
 from chladni.models.integrator.march import linear_march
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 
 
 def is_plain(compiled: CompiledModel) -> bool:
-    """Whether a model is a recursion from sample to sample: no laws, nothing that looks back or reads in between."""
+    """Whether a model is a recursion from sample to sample, whose runs cost less than slopes along them.
+
+    It has no laws, no dead times in loops and no clocks that read between samples.
+    """
     return not (compiled.laws or compiled.delays or any(compiled.output_offsets_s))
 
 
-def can_run(compiled: CompiledModel) -> bool:
-    """Whether slopes along a run are worth it: there are laws, dead times in loops, clocks that read between samples.
+def one_step(a: Real, b: Real, hold: Hold, sample_rate_hz: float) -> Real:
+    """``[state, state + width]``: one step of the states under signals that enter by b, spread over the hold."""
+    return responses(
+        a,
+        b,
+        np.zeros((len(b), 0)),
+        hold,
+        step_s=1.0 / sample_rate_hz,
+        kink_at=hold.kink_at,
+        fractions=np.ones(1),
+    )[0].state
 
-    All else is a recursion from sample to sample, whose runs cost less than slopes along them.
+
+def linear_outputs(
+    laid: LaidInputs, compiled: CompiledModel, rows: Whole, windows: Sequence[tuple[int, int]], initial: Real
+) -> Real:
+    """Give ``[output, sample]`` of the outputs `rows`, before maps of samples, from ``initial [window, state]``.
+
+    A model that diverges is a `ModelError`.
     """
-    return not is_plain(compiled)
-
-
-class LinearRuns:
-    """Linear free runs under the inputs of one log."""
-
-    def __init__(self, inputs: LaidInputs) -> None:
-        self._inputs, self._rate_hz = inputs, inputs.sample_rate_hz
-
-    def outputs(
-        self, compiled: CompiledModel, rows: Whole, windows: Sequence[tuple[int, int]], initial: Real
-    ) -> Real:
-        """Give ``[output, sample]`` of the outputs `rows`, before maps of samples, from ``initial [window, state]``.
-
-        A model that diverges is a `ModelError`.
-        """
-        hold = hold_of(compiled, self._rate_hz)
-        inputs = self._inputs.rows(compiled, hold)
-        b, g = hold.spread(compiled.b), np.zeros((len(compiled.states), 0))
-        step = responses(
-            compiled.a, b, g, hold,
-            step_s=1.0 / self._rate_hz, kink_at=hold.kink_at, fractions=np.ones(1),
-        )[0].state  # fmt: skip
-        advance = np.ascontiguousarray(step.T)
-        state = np.zeros((len(inputs), len(compiled.states)))
-        for (start, stop), first in zip(windows, initial, strict=True):
-            state[start] = first
-            linear_march(advance, inputs[start:stop], state[start:stop])
-        ends = state[[stop - 1 for _, stop in windows]]
-        if not np.all(np.isfinite(ends)):
-            raise ModelError("the model diverges within the log; a loop is unstable, or a parameter is impossible")
-        through = hold.spread(compiled.d[rows])
-        return np.asarray(compiled.c[rows] @ state.T + through @ inputs[:, : hold.columns].T)
+    hold = hold_of(compiled, laid.sample_rate_hz)
+    inputs = laid.rows(compiled, hold)
+    advance = np.ascontiguousarray(one_step(compiled.a, hold.spread(compiled.b), hold, laid.sample_rate_hz).T)
+    state = np.zeros((len(inputs), len(compiled.states)))
+    for (start, stop), first in zip(windows, initial, strict=True):
+        state[start] = first
+        linear_march(advance, inputs[start:stop], state[start:stop])
+    ends = state[[stop - 1 for _, stop in windows]]
+    if not np.all(np.isfinite(ends)):
+        raise ModelError("the model diverges within the log; a loop is unstable, or a parameter is impossible")
+    through = hold.spread(compiled.d[rows])
+    return np.asarray(compiled.c[rows] @ state.T + through @ inputs[:, : hold.columns].T)
 
 
 def decay(compiled: CompiledModel, rows: Whole, sample_rate_hz: float, count: int) -> Real:

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.linalg import schur
 
 from chladni.gap.calibration import ROUNDING
+from chladni.gap.plant.linear_run import one_step
 from chladni.gap.plant.record_lines import RecordLines
 from chladni.models.core.compiled_model import CompiledModel
-from chladni.models.integrator.exponential import responses
-from chladni.models.integrator.hold import Hold, free_hold, hold_of
+from chladni.models.integrator.hold import free_hold, hold_of
 from chladni.models.integrator.input_rows import input_rows
 from chladni.signals.arrays import Complex, Real
 
@@ -119,7 +119,7 @@ class LinearView:
         self.compiled, self.lines, self.rows = compiled, lines, list(rows)
         self.hold = hold_of(compiled, lines.sample_rate_hz)
         n = len(compiled.states)
-        step = self._step(self.hold.spread(compiled.b), self.hold)
+        step = one_step(compiled.a, self.hold.spread(compiled.b), self.hold, lines.sample_rate_hz)
         self._gamma = step[:, n:]
         # Triangular form once: then each line costs a substitution, defective matrices (a free body) included.
         self._triangle, self._unitary = schur(step[:, :n], output="complex")
@@ -219,7 +219,8 @@ class LinearView:
         # Asked for port by port: few are ever looked at, and each makes the exponential larger.
         if port not in self._forces:
             one = free_hold(1)
-            self._forces[port] = self._step(one.spread(self.compiled.g[:, [port]]), one)[:, len(self._triangle) :]
+            step = one_step(self.compiled.a, one.spread(self.compiled.g[:, [port]]), one, self.lines.sample_rate_hz)
+            self._forces[port] = step[:, len(self._triangle) :]
         return self._forces[port]
 
     @cached_property
@@ -233,18 +234,6 @@ class LinearView:
             ahead = along(upper[None, :place, place], found[:place])[0]
             found[place] = (wanted[:, place, None] + ahead) / (self._z - upper[place, place])
         return along(self._unitary.conj(), found)
-
-    def _step(self, b: Real, hold: Hold) -> Real:
-        """``[state, state + width]``: one step of the states under signals that enter by b."""
-        return responses(
-            self.compiled.a,
-            b,
-            np.zeros((len(b), 0)),
-            hold,
-            step_s=1.0 / self.lines.sample_rate_hz,
-            kink_at=hold.kink_at,
-            fractions=np.ones(1),
-        )[0].state
 
     def _drive(self, transient: Real | None, forces: Sequence[tuple[Way, Complex]]) -> Complex:
         """``[state, segment, line]`` of all that drives the states."""

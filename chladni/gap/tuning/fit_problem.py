@@ -8,7 +8,7 @@ import numpy as np
 from chladni.gap.calibration import JITTER, RIDGE, RUNAWAY, STEP, UNNOTICED, WIDE, ZERO
 from chladni.gap.plant.free_run import FreeRun, initial_states
 from chladni.gap.plant.law_plant import LawRunResult, Setting, around, coarse_run, differences, fine_run, slopes_of
-from chladni.gap.plant.linear_run import can_run, decay
+from chladni.gap.plant.linear_run import decay, is_plain
 from chladni.gap.tuning.effect_scale import EffectNumber, with_numbers
 from chladni.gap.tuning.residual import Residual, Whitening, likelihood_cost, weights
 from chladni.models.effects.attached_effect import AttachedEffect
@@ -84,7 +84,7 @@ class FitProblem:
         self._wide = np.zeros(0)
         compiled = run.compiled(start_z, self.effects)
         self.has_laws = bool(compiled.laws)
-        self.has_slopes = can_run(compiled)
+        self.has_slopes = not is_plain(compiled)
         self.coarse = self.has_slopes
         #: Whether the last slopes are secants of the steps since those before, not differences where they were asked.
         self.stale = False

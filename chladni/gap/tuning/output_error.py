@@ -49,8 +49,6 @@ class OutputErrorFit(Value):
         ``[output]`` the same over the samples that the fit didn't see, empty when it saw all.
     prior_cost
         ``z.z``, of freed parameters over their own spread: what leaving the nominal values costs.
-    cost
-        Negative log-likelihood and half the prior cost, nats: what the fit made least.
     undetermined
         Names of the parameters that this log leaves as uncertain as they were: nothing but their tolerance keeps them
         near nominal, and they move with others that they depend on.
@@ -69,7 +67,6 @@ class OutputErrorFit(Value):
     misfit: float
     held_by_output: Real
     prior_cost: float
-    cost: float
     undetermined: tuple[str, ...]
     covariance: Real
 
@@ -298,7 +295,6 @@ def _report(problem: FitProblem, here: Evaluation, slopes: Slopes, *, held: Mask
         misfit=float(np.mean(here.residual.power)),
         held_by_output=np.mean(white**2, axis=1) if held.any() else np.zeros(0),
         prior_cost=2.0 * problem.prior_of(x),
-        cost=here.cost,
         covariance=covariance,
         **_spreads(problem, x, covariance),
     )

@@ -136,17 +136,11 @@ def test_each_word_that_leads_is_tried_at_all_parts_of_its_kind(monkeypatch: pyt
     frictions = [attached("coulomb_friction", joint, {"force": 4.0}) for joint in ("shoulder", "elbow", "hand")]
     study = study_of(arm(), measured(frictions, seconds=2.0, noise=0.005), leave_out=all_but("hysteresis"), own={})
     search = Search(study)
-    search.found += study.contest.enter_all(
-        [
-            hypothesis_of(
-                (attached(first, "elbow", words[first]), attached(second, "hand", words[second])),
-                study.location.tuned.z,
-            )
-            for first in words
-            for second in words
-        ],
-        max_iterations=1,
-    )
+    z = study.location.tuned.z
+    for first in words:
+        for second in words:
+            both = attached(first, "elbow", words[first]), attached(second, "hand", words[second])
+            search.found.append(study.contest.enter(hypothesis_of(both, z), max_iterations=1))
     search.__dict__.pop("belief", None)
     monkeypatch.setattr(Search, "is_open", True)
     tried: list[set[str]] = []

@@ -7,7 +7,7 @@ import pytest
 
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.law_plant import Setting, coarse_run, fine_run, slopes_of
-from chladni.gap.plant.linear_run import can_run
+from chladni.gap.plant.linear_run import is_plain
 from chladni.models.effects.attached_effect import attached
 from chladni.models.integrator.integrator import Integrator
 from chladni.models.integrator.slopes import modal_coordinates
@@ -151,5 +151,5 @@ def test_a_model_that_diverges_says_so(run):
 
 def test_a_recursion_from_sample_to_sample_runs_by_itself():
     model = three_bodies().with_effects([LAWS["hardening"]])
-    assert can_run(model.compile())
-    assert not can_run(three_bodies().compile())
+    assert not is_plain(model.compile())
+    assert is_plain(three_bodies().compile())
