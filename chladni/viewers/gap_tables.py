@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 
-from chladni.gap.records.diagnosis import Cause, Diagnosis, DistortionShare, FittedNumber, Ranked, Where
+from chladni.gap.records.diagnosis import PARAMETER, Cause, Diagnosis, DistortionShare, FittedNumber, Ranked, Where
 from chladni.models.effects.catalogue import CATALOGUE
 from chladni.signals.engineering import (
     NOTHING,
@@ -97,8 +97,9 @@ def force_title(found: Diagnosis, site: str) -> str:
 
 
 def sites_named(found: Diagnosis) -> set[str]:
-    """Sites of the causes; both of a pair."""
-    return {site for cause in found.causes for site in (cause.site, *cause.site.split("~"))}
+    """Sites of the causes; both of a pair, and what a wrong value is a value of."""
+    sites = {site for cause in found.causes for site in (cause.site, *cause.site.split("~"))}
+    return sites | {cause.site.rpartition(".")[0] for cause in found.causes if cause.effect == PARAMETER}
 
 
 def site_table(where: Where, *, count: int | None = None) -> Table:

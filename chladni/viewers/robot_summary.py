@@ -59,11 +59,16 @@ def robot_sentences(found: Diagnosis) -> Iterator[str]:
     clauses = [one.sentence() for one in _joined(_clauses(_in_order(found)))]
     prefix = "Nothing is missing, but values are wrong: " if found.verdict == "parameters" else ""
     if len(clauses) <= IN_A_SENTENCE:
-        yield f"{prefix}{'; '.join(clauses)}."
+        yield _begun(f"{prefix}{'; '.join(clauses)}.")
         return
     told = listed(_by_word(found.causes))
     yield f"{prefix or told[0].upper()}{told if prefix else told[1:]}."
-    yield from (f"{one}." for one in clauses)
+    yield from (_begun(f"{one}.") for one in clauses)
+
+
+def _begun(sentence: str) -> str:
+    """Give a sentence its capital; names of joints stay as they are."""
+    return f"A{sentence[1:]}" if sentence.startswith("all ") else sentence
 
 
 def robot_unknown(found: Diagnosis) -> Iterator[str]:

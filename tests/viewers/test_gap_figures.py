@@ -161,6 +161,8 @@ def test_bars_are_the_shares_and_the_named_site_is_in_colour(figures: dict[str, 
     assert [bar.get_width() for bar in bars] == pytest.approx([93, 31, 28, 12])
     colours = [bar.get_facecolor() for bar in bars]
     assert colours[0] != colours[1] == colours[2]
+    wrong = gap_album(gap_evidence(made.wrong_values())).figures["where"].axes[0].patches
+    assert [bar.get_facecolor() for bar in wrong][:2] == colours[:2]
 
 
 def test_one_output_has_room_for_its_curves() -> None:

@@ -76,6 +76,10 @@ def test_many_causes_begin_with_what_there_is() -> None:
     )
     assert told[0] == "Coulomb friction at 6 sites and lag at joint_1."
     assert len(told) == 7
+    late = cause("delay", "all commands", 0.97, delay=(8e-3, 2e-4, "s"))
+    both = sentences(late, *(rubs(f"joint_{place}", 2.0**place) for place in range(6)))
+    assert both[1] == "All commands arrive 8.00 ± 0.20 ms late (97 %)."
+    assert sentences(late) == [both[1]]
     assert told[2] == "joint_1 rubs: Coulomb 2.00 ± 0.10 N m, and follows with a lag of 20.0 ± 1.0 ms (90 %)."
 
 
