@@ -1,5 +1,6 @@
 """``chladni simulate``: a log with known truth."""
 
+from math import isinf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,13 +11,15 @@ from chladni.cli.opening import Opener, opens_files
 from chladni.cli.output import Output
 from chladni.cli.places import require_places
 from chladni.cli.settings import effect_of, with_settings
-from chladni.cli.words import count, number
+from chladni.cli.words import NOTHING, count, number
+from chladni.signals.errors import SetupError
 from chladni.signals.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from chladni.apps.simulated_log import SimulatedLog
+    from chladni.apps.simulated_robot import JointError
     from chladni.io.mcap.writer import WrittenLog
     from chladni.models.core.instrument import Instrument
     from chladni.models.core.model import Model
@@ -24,7 +27,12 @@ if TYPE_CHECKING:
 
 
 ModelOrInstrument = Annotated[
-    str, typer.Argument(metavar="MODEL", help="A model file, or the name of an instrument.", show_default=False)
+    str,
+    typer.Argument(
+        metavar="MODEL",
+        help="A model file, the name of an instrument, or a robot (MJCF, URDF, robot file; with --log).",
+        show_default=False,
+    ),
 ]
 Target = Annotated[Path, typer.Option("--out", metavar="LOG.mcap", help="The log to write.", show_default=False)]
 Seconds = Annotated[
@@ -64,6 +72,12 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Change a parameter; may be repeated.", show_default=False),
 ]
+State = Annotated[
+    str | None, typer.Option(metavar="TOPIC", help="Of a robot: where its joints were measured.", show_default=False)
+]
+Command = Annotated[
+    str | None, typer.Option(metavar="TOPIC", help="Of a robot: where its joints were commanded.", show_default=False)
+]
 Effects = Annotated[
     list[str] | None,
     typer.Option(
@@ -91,9 +105,11 @@ def simulate(
     seed: Seed = 0,
     settings: Settings = None,
     effect: Effects = None,
+    state: State = None,
+    command: Command = None,
     json: options.Json = None,
 ) -> None:
-    """Simulate a model and write a log, with its truth beside it and in its metadata."""
+    """Simulate a model and write a log, with its truth beside it; or a robot, by a log's commands."""
     from chladni.apps.model_sources import named_instrument, recording_for
     from chladni.apps.simulated_log import Drive, require_log_place, simulate_log, write_simulated_log
 
@@ -104,6 +120,13 @@ def simulate(
         reads=[Path(model), log, opener.setup],
         writes={"--out": out, "the truth of --out": out.with_suffix(".truth.json"), "--json": json},
     )
+    if _is_robot(model):
+        _refuse({"--input": None if kind == "random" else kind, "--at": at, "--level": level, "--band": band,
+                 "--seconds": seconds, "--noise": noise or None, "--set": settings, "--effect": effect})  # fmt: skip
+        _simulate_robot(to, Path(model), log, out, opener, state=state, command=command)
+        return
+    if state is not None or command is not None:
+        raise SetupError(f"--state and --command name topics of a robot's joints, and {model!r} is none")
     instrument = named_instrument(model)
     chosen = _changed(instrument.model(), settings or (), effect or ())
     recording = None
@@ -130,6 +153,47 @@ def simulate(
     nrmse = {score.name.removeprefix("NRMSE "): score.value for score in made.agreement}
     to.json(lambda: {**made.truth, "format": "chladni.simulate/1", "log": str(written.path), "truth_file": str(truth),
              "nrmse_percent": nrmse})  # fmt: skip
+
+
+def _is_robot(name: str) -> bool:
+    from chladni.robots.loading import is_robot_file
+
+    # Instruments have names without a suffix.
+    return Path(name).is_file() and is_robot_file(Path(name))
+
+
+def _simulate_robot(
+    to: Output, path: Path, log: Path | None, out: Path, opener: Opener, *, state: str | None, command: str | None
+) -> None:
+    from chladni.apps.simulated_robot import run_told, simulate_robot, simulated_robot_document
+    from chladni.io.mcap.writer import write_mcap
+    from chladni.robots.loading import load_robot
+
+    if log is None:
+        raise SetupError(f"{path}: a robot runs by the commands of a log; give one with --log")
+    with opener(log) as opened, to.progress(log.name):
+        found = simulate_robot(load_robot(path, meshes=False), opened, state=state, command=command)
+    written = write_mcap(found.series, out)
+    to.line(
+        f"{found.robot}: {number(found.series.duration_s, digits=6)} s at "
+        f"{number(found.series.sample_rate_hz, digits=6)} Hz by {found.log}, {run_told(found)}"
+    )
+    to.table(
+        "Simulated less measured position",
+        ["joint", "RMS error", "of its motion"],
+        [[one.joint, *_error_row(one)] for one in found.joints],
+    )
+    to.lines(found.remarks)
+    to.line(f"wrote {written.path}")
+    to.json(lambda: {**simulated_robot_document(found), "log": str(written.path)})
+
+
+def _error_row(one: "JointError") -> tuple[str, str]:
+    from chladni.signals.engineering import engineering, percent
+
+    if isinf(one.error):
+        return "astray", NOTHING
+    return engineering(one.error, None, one.unit), percent(one.error / one.motion) if one.motion else NOTHING
 
 
 def _changed(model: "Model", settings: "Sequence[str]", effects: "Sequence[str]") -> "Model":
@@ -170,8 +234,6 @@ def _rows(series: "TimeSeries", names: "Mapping[str, str]") -> list[list[str]]:
 
 def _refuse(given: dict[str, object]) -> None:
     """Raise `SetupError` for what a log that drives the model decides itself."""
-    from chladni.signals.errors import SetupError
-
     for name, value in given.items():
         if value is not None:
             raise SetupError(f"{name} has no meaning with --log: the log's own signals drive the model")

@@ -149,7 +149,7 @@ class Trial:
 
     def _run(self, machine: Machine) -> Course:
         judging, others = (self._blocks[1::2], self._blocks[::2]) if self._held_out else (self._blocks, [])
-        runs = _runs(self.torques, judging), _runs(self.torques, others)
+        runs = runs_of(self.torques, judging), runs_of(self.torques, others)
         return Course(machine=machine, torques=self.torques, runs=runs)
 
     @property
@@ -179,7 +179,8 @@ class Trial:
         return found
 
 
-def _runs(torques: Torques, blocks: Runs) -> Runs:
+def runs_of(torques: Torques, blocks: Runs) -> Runs:
+    """Give blocks as runs: whole where the drives hold positions, else in periods of the cutoff."""
     if torques.log.command_kind == "position" and not by_effort(torques):
         return blocks
     count = max(round(torques.log.sample_rate_hz / torques.cutoff_hz), 2)
