@@ -1,24 +1,11 @@
 """What a force leaves of a change: one that follows a motion along any path, and one of any shape at one place."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import minimize
 
 from chladni.gap.calibration import MOST_STEPS, SIGMAS, SLIGHT, UNNOTICED
 from chladni.gap.location.modal_paths import ModalPaths
 from chladni.signals.arrays import Complex, Real
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Products:
-    """Normal equations of all products of a block of the path and a function of the motion.
-
-    ``gram [block, block', function, function']`` and ``right [block, function]``, real.
-    """
-
-    gram: Real
-    right: Real
 
 
 def unseen_losses(blocks: Complex, forces: Complex, change: Complex) -> Real:
@@ -46,7 +33,7 @@ def unseen_losses(blocks: Complex, forces: Complex, change: Complex) -> Real:
         return np.asarray(losses)
     for fold in range(2):
         seen, unseen = lines % 2 != fold, lines % 2 == fold
-        path, law = _fitted(_products(blocks[..., seen], forces[..., seen], change[..., seen]))
+        path, law = _fitted(*_products(blocks[..., seen], forces[..., seen], change[..., seen]))
         printed = _printed(path, law, blocks[..., unseen], forces[..., unseen])
         losses[unseen] = np.sum(np.abs(change[..., unseen] - printed) ** 2, axis=(0, 1))
     return np.asarray(losses)
@@ -58,19 +45,22 @@ def _printed(path: Real, law: Real, blocks: Complex, forces: Complex) -> Complex
     return np.asarray(force[:, None] * np.tensordot(path, blocks, 1))
 
 
-def _products(blocks: Complex, forces: Complex, change: Complex) -> _Products:
+def _products(blocks: Complex, forces: Complex, change: Complex) -> tuple[Real, Real]:
+    """Normal equations of all products of a block of the path and a function of the motion.
+
+    They are ``gram [block, block', function, function']`` and ``right [block, function]``, real.
+    """
     along = np.einsum("tok,uok->tuk", blocks.conj(), blocks)
     acting = np.einsum("lfk,lgk->fgk", forces.conj(), forces)
     lines = along.shape[2]
     gram = (along.reshape(-1, lines) @ acting.reshape(-1, lines).T).real
     met = np.einsum("tok,lok->tlk", blocks.conj(), change)
     right = np.einsum("tlk,lfk->tf", met, forces.conj()).real
-    return _Products(gram=gram.reshape(*along.shape[:2], *acting.shape[:2]), right=right)
+    return gram.reshape(*along.shape[:2], *acting.shape[:2]), right
 
 
-def _fitted(products: _Products) -> tuple[Real, Real]:
+def _fitted(gram: Real, right: Real) -> tuple[Real, Real]:
     """Path and law whose product explains most: one after the other, from the best free product's first part."""
-    gram, right = products.gram, products.right
     size = right.size
     free = _solved(gram.transpose(0, 2, 1, 3).reshape(size, size), right.ravel(), loading=SLIGHT)
     law = np.linalg.svd(free.reshape(right.shape), full_matrices=False)[2][0]

@@ -102,21 +102,20 @@ def recovered(problem: LinearProblem, found: Profile, site: Site, others: Sequen
     residual = ((whole.measured - view.forced()) * whole.weight)[:, 0]
     transients = whole.transients(view)[:, :, 0]
     start = _starts(view, whole.measured, whole.weight)
-    found_at = _unknowns(patterns, residual, transients, found.transient, start)
-    first, beside = found_at.force[0], found_at.force[1:]
+    forces, reliable, transient = _unknowns(patterns, residual, transients, found.transient, start)
     ways = [whole.way(view, one) for one in (site, *others)]
-    acting = [(way, one[None]) for way, one in zip(ways, found_at.force, strict=True)]
-    force = lines.signal(first[None])[0]
+    acting = [(way, one[None]) for way, one in zip(ways, forces, strict=True)]
+    force = lines.signal(forces[:1])[0]
     if site.kind == "output" and ways[0].port is None:
         row = measurement.output_names.index(site.name)
         # Not what was measured less the force: where noise hides that, it would be the shaped signal again.
-        seen = lines.signal(view.response(found_at.transient, acting[1:]))[row, 0]
+        seen = lines.signal(view.response(transient, acting[1:]))[row, 0]
         displacement, velocity = seen + measurement.outputs[row].mean(), np.zeros(lines.samples)
     elif site.kind == "input" and ways[0].port is None:
         row = measurement.input_names.index(site.name)
         displacement, velocity = measurement.inputs[row], np.zeros(lines.samples)
     else:
-        motion = view.motion(view.compiled.port_index(site.name, site.kind), found_at.transient, acting)
+        motion = view.motion(view.compiled.port_index(site.name, site.kind), transient, acting)
         displacement, velocity = (lines.signal(one)[0] for one in motion)
     return Recovered(
         site=site,
@@ -124,26 +123,20 @@ def recovered(problem: LinearProblem, found: Profile, site: Site, others: Sequen
         force=force,
         displacement=displacement,
         velocity=velocity,
-        reliable=found_at.reliable,
+        reliable=reliable,
         z=found.z,
-        transient=found_at.transient,
-        beside=tuple((one, lines.signal(free[None])[0]) for one, free in zip(others, beside, strict=True)),
+        transient=transient,
+        beside=tuple((one, lines.signal(free[None])[0]) for one, free in zip(others, forces[1:], strict=True)),
     )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Unknown:
-    """Forces ``[site, line]``, how far the first is believed, and the transients ``[state, 1]`` beside them."""
-
-    force: Complex
-    reliable: Real
-    transient: Real
 
 
 def _unknowns(
     patterns: Sequence[Complex], residual: Complex, transients: Complex, transient: Real, start: Real
-) -> _Unknown:
-    """Recover forces along patterns ``[output, line]``, random, of the power that each shows beside the others."""
+) -> tuple[Complex, Real, Real]:
+    """Recover forces along patterns ``[output, line]``, random, of the power that each shows beside the others.
+
+    Beside the forces ``[site, line]`` it gives how far the first is believed, and the transients ``[state, 1]``.
+    """
     along = np.moveaxis(np.asarray(patterns), -1, 0)
     reach = along.transpose(0, 2, 1)
     for _ in range(2):
@@ -160,7 +153,7 @@ def _unknowns(
         transient = _transient(transients, weight, residual, start)
     left = residual - np.tensordot(transient[:, 0], transients, axes=1)
     force = power * np.einsum("lko,lop,pl->lk", along.conj(), weight, left, optimize=True)
-    return _Unknown(force=np.asarray(force.T, dtype=np.complex128), reliable=reliable, transient=transient)
+    return np.asarray(force.T, dtype=np.complex128), reliable, transient
 
 
 def _power(pattern: Complex, beside: Sequence[Complex], left: Complex) -> tuple[Real, Real, Real]:

@@ -89,6 +89,7 @@ def test_where_two_forces_print_one_pattern_their_covariance_has_an_inverse(apar
     rng = np.random.default_rng(0)
     first, other, residual = (rng.standard_normal((3, 60)) + 1j * rng.standard_normal((3, 60)) for _ in range(3))
     transients = rng.standard_normal((2, 3, 60)) + 0j
-    found = _unknowns([first, first + apart * other], residual, transients, np.zeros((2, 1)), np.zeros((2, 2)))
-    assert np.all(np.isfinite(found.force))
-    assert np.all(np.isfinite(found.transient))
+    patterns, none = [first, first + apart * other], (np.zeros((2, 1)), np.zeros((2, 2)))
+    force, _, transient = _unknowns(patterns, residual, transients, *none)
+    assert np.all(np.isfinite(force))
+    assert np.all(np.isfinite(transient))
