@@ -40,7 +40,8 @@ def searched(places: Sequence[Located], forms: Sequence[Form]) -> list[Screened]
     plausible = {site for one in places if one.profile.chi < enough for site, _ in sites_at(one)}
     best: dict[tuple[str, str, str | None, str | None], Form] = {}
     for one, screen in found:
-        best.setdefault((one.trial.effect, one.trial.site.name, one.trial.variant, one.trial.source), (one, screen))
+        form = one.trial.form
+        best.setdefault((one.trial.effect, one.trial.site.name, form.variant, form.source), (one, screen))
     worth = _worth_a_search([one for one, _ in best.values()], plausible)
     chosen = {place: form for place, form in enumerate(best.values()) if place in worth}
     ends = dict(zip(chosen, side_by_side(lambda form: _searched(*form), [*chosen.values()]), strict=True))

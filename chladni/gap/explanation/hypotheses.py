@@ -56,10 +56,10 @@ def hypothesis_of(effects: tuple[AttachedEffect, ...], z: Real, *, initial: Real
 
 def effect_of(one: Screened) -> AttachedEffect | None:
     """Give the effect of a screened trial, its values held inside their possible ranges; None when it's none."""
-    trial = one.trial
-    if trial.kind is None:
+    kind, form = one.trial.kind, one.trial.form
+    if kind is None:
         return None
-    plain = attached_if_possible(trial.kind, trial.site.name, one.values, variant=trial.variant, source=trial.source)
+    plain = attached_if_possible(kind, one.trial.site.name, one.values, variant=form.variant, source=form.source)
     if plain is None:
         return None
     values = {name: _inside(plain.parameters[name]) for name in plain.values}

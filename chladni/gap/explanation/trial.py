@@ -28,16 +28,6 @@ class SiteTrial:
         """The word."""
         return self.kind.name if self.kind is not None else ""
 
-    @property
-    def variant(self) -> str | None:
-        """Form of the law."""
-        return self.form.variant
-
-    @property
-    def source(self) -> str | None:
-        """Name of another output that the effect listens to."""
-        return self.form.source
-
 
 def trials_at(
     problem: LinearProblem,

@@ -37,7 +37,7 @@ def screen():
     place = profile_at(problem, (JOINT,), near + 0.2 * np.cos(5.0 * np.arange(off.size)))
     motion = recovered(problem, place, JOINT)
     trials = trials_at(problem, log, motion, excited_band_hz(log), [HARDENING_STIFFNESS])
-    (trial,) = (one for one in trials if one.variant is None)
+    (trial,) = (one for one in trials if one.form.variant is None)
     return Screen(problem, place, JOINT), trial
 
 

@@ -30,10 +30,10 @@ def test_a_limit_whose_knee_is_neither_sharp_nor_a_tanh_is_a_rounded_saturation(
     location = locate(model, log, floor, Tunables.of(model))
     forms = [one for one in screened(location, location.ranked, words) if one.trial.site.name == "hammer"]
     best = forms[0]
-    assert (best.trial.effect, best.trial.variant) == ("saturation", "rounded")
+    assert (best.trial.effect, best.trial.form.variant) == ("saturation", "rounded")
     assert best.values["limit"] == pytest.approx(limit, rel=0.05)
     # Its law isn't ours, but leaves a tenth of what either of the others does.
-    others = [one.chi for one in forms if one.trial.effect == "saturation" and one.trial.variant != "rounded"]
+    others = [one.chi for one in forms if one.trial.effect == "saturation" and one.trial.form.variant != "rounded"]
     assert len(others) == 2
     assert best.chi < 0.1 * min(others)
     (first, *_) = effect_hypotheses(forms, count=1)

@@ -59,7 +59,7 @@ def found():
 
 def test_a_yielding_element_behind_a_dashpot_is_hysteresis(found):
     best = found[0].trial
-    assert (best.effect, best.variant, best.site.name) == ("hysteresis", "creeping", "seal")
+    assert (best.effect, best.form.variant, best.site.name) == ("hysteresis", "creeping", "seal")
     rival = next(one for one in found if one.trial.effect == "coulomb_friction")
     assert rival.misfit > 2 * found[0].misfit
 
@@ -80,7 +80,7 @@ def test_a_cube_whose_middle_lies_beside_rest_is_told_with_its_square():
     values = {"cubic": 3e8, "quadratic": -6e5}
     cube = attached("hardening_stiffness", "j0", values, variant="asymmetric")
     best = screened_at_an_oscillator(cube, damping=8.0, samples=2000)[0]
-    assert (best.trial.effect, best.trial.variant) == ("hardening_stiffness", "asymmetric")
+    assert (best.trial.effect, best.trial.form.variant) == ("hardening_stiffness", "asymmetric")
     assert best.values["cubic"] == pytest.approx(values["cubic"], rel=0.1)
     assert best.values["quadratic"] == pytest.approx(values["quadratic"], rel=0.15)
 
@@ -91,13 +91,13 @@ def test_teeth_are_told_with_their_second_harmonic():
     teeth = attached("ripple", "j0", values, variant="harmonics")
     # The actuator's ripple is the joint's with the other sign: which of the two comes first is rounding's choice.
     best, *others = (one for one in screened_at_an_oscillator(teeth, noise=1e-3) if one.trial.site.name == "j0")
-    assert (best.trial.effect, best.trial.variant) == ("ripple", "harmonics")
+    assert (best.trial.effect, best.trial.form.variant) == ("ripple", "harmonics")
     # But for the phase: where the middle of the way lies no spectrum without its mean tells.
     assert best.values["amplitude"] == pytest.approx(values["amplitude"], rel=0.1)
     assert best.values["period"] == pytest.approx(values["period"], rel=0.05)
     assert best.values["second_sine"] == pytest.approx(values["second_sine"], abs=0.1)
     assert best.values["second_cosine"] == pytest.approx(values["second_cosine"], abs=0.1)
-    sine = next(one for one in others if (one.trial.effect, one.trial.variant) == ("ripple", "sine"))
+    sine = next(one for one in others if (one.trial.effect, one.trial.form.variant) == ("ripple", "sine"))
     assert sine.misfit > 3 * best.misfit
 
 
@@ -105,7 +105,7 @@ def test_teeth_are_told_with_their_second_harmonic():
 def test_bristles_that_bend_within_a_sample_are_found():
     dahl = attached("coulomb_friction", "j0", {"force": 20.0, "presliding": 2e-6}, variant="bristle")
     screen = screened_at_an_oscillator(dahl, measures="acceleration", samples=6000, rms=100.0)
-    forms = {(one.trial.effect, one.trial.variant): one for one in screen}
+    forms = {(one.trial.effect, one.trial.form.variant): one for one in screen}
     found = forms["coulomb_friction", "bristle"].values
     # Between two samples it moves ten times as far as the bristles bend. Along the recovered motion they seem a fifth
     # to a third longer, whatever the noise: near enough for a fit to begin with.
@@ -118,7 +118,11 @@ def test_a_round_contact_is_a_stop_and_no_spring_that_hardens_to_one_side():
     values = {"stiffness": 6e4, "clearance": 1.5e-3, "depth": 1e-3, "dissipation": 0.3}
     contact = attached("one_sided_stop", "j0", values, variant="hertz_damper")
     best = screened_at_an_oscillator(contact)[0]
-    assert (best.trial.effect, best.trial.variant, best.values["side"]) == ("one_sided_stop", "hertz_damper", 1.0)
+    assert (best.trial.effect, best.trial.form.variant, best.values["side"]) == (
+        "one_sided_stop",
+        "hertz_damper",
+        1.0,
+    )
     assert best.values["clearance"] == pytest.approx(1.5e-3, rel=0.2)
     # Stiffness at another depth is the same law: compared as N/m^1.5.
     found = best.values["stiffness"] / np.sqrt(best.values["depth"])

@@ -26,9 +26,9 @@ def test_a_range_whose_end_is_round_is_told_though_the_floor_took_it_for_noise()
     location = locate(model, log, thought, Tunables.of(model))
     forms = screened(location, location.ranked, WORDS)
     best = forms[0]
-    assert (best.trial.effect, best.trial.variant, best.trial.site.name) == ("clipping", "rounded", "a0")
+    assert (best.trial.effect, best.trial.form.variant, best.trial.site.name) == ("clipping", "rounded", "a0")
     assert best.values["limit"] == pytest.approx(ends, rel=0.05)
-    others = {one.trial.variant: one.misfit for one in forms if one.trial.effect == "clipping"}
+    others = {one.trial.form.variant: one.misfit for one in forms if one.trial.effect == "clipping"}
     assert best.misfit < others[None]
     # It explains nearly all of that noise: a line and a Gaussian floor leave as much as there was.
     assert best.chi < 0.6 * location.tuned.chi
