@@ -65,20 +65,15 @@ def local_fit(inputs: Real, outputs: Real) -> ResidualSpectra | None:
 
         D(r) Y(k + r) = sum_i N_i(r) U_i(k + r) + T(r),   D = 1 + d_1 r + d_2 r^2,
 
-    N and T of second degree. T holds what start and end of the record leak (the whole record is transformed
-    without window, which makes it smooth). d comes from this equation by linear least squares, then N and T from
-    the output error ``Y - (N U + T)/D`` (McKelvey & Guerin 2012; Pintelon & Schoukens 2012, section 7.2). Where D = 1
-    leaves less for its freedom, D is 1.
+    N and T of second degree. T holds what start and end of the record leak (the whole record is transformed without
+    window, which makes it smooth). d comes from this equation by linear least squares, then N and T from the output
+    error ``Y - (N U + T)/D`` (McKelvey & Guerin 2012; Pintelon & Schoukens 2012, section 7.2). Where D = 1 leaves
+    less for its freedom, D is 1. There's None when the record has fewer lines than one block.
 
     Parameters
     ----------
     inputs, outputs
         ``[input, sample]``, ``[output, sample]``.
-
-    Returns
-    -------
-    ResidualSpectra or None
-        None when the record has fewer lines than one block.
     """
     samples = outputs.shape[1]
     unknowns = LOCAL_TERMS * (len(inputs) + 1)

@@ -96,11 +96,6 @@ def matched_log(
     begins_s, damage
         Where in the log the recording begins, and what of the file couldn't be read, for messages.
 
-    Returns
-    -------
-    MatchedLog
-        Measurement, and sentences on what limits it.
-
     Raises
     ------
     LogError

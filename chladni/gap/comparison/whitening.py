@@ -83,16 +83,13 @@ def with_law_error(noise: NoiseFloor, scale: Real) -> NoiseFloor:
     Where noise is faint in a band, an exact whitening makes a fit follow that band and give the others up: drift of
     1 % and a quiet rest weigh the corners of a force a thousand times its plateaus. A law's error has no known colour
     and is taken as white, with `LAW_ERROR` of each output. Only the filter is theirs; its level remains that of the
-    noise alone, so that noise still has a whitened mean square of 1.
+    noise alone, so that noise still has a whitened mean square of 1. It's the same floor where the noise is white, or
+    loud in all bands.
 
     Parameters
     ----------
     scale
         ``[output]`` RMS of what was measured.
-
-    Returns
-    -------
-    The same floor where the noise is white, or loud in all bands.
     """
     if not np.any(noise.whitening[:, 1:]):
         return noise

@@ -27,8 +27,8 @@ def next_measurement(
     """Say which measurement would tell candidates apart that are still close.
 
     Every design is simulated with every candidate as fitted; each candidate is refitted to what the other predicts,
-    and what is left is weighed as the contest weighs (after Hunter & Reiner 1965, Box & Hill 1967, Atkinson &
-    Fedorov 1975). The smallest change that tells them apart is named.
+    and what is left is weighed as the contest weighs (after Hunter & Reiner 1965, Box & Hill 1967, Atkinson & Fedorov
+    1975). The smallest change that tells them apart is named. There's None when there's nothing to tell apart.
 
     Parameters
     ----------
@@ -36,11 +36,6 @@ def next_measurement(
         Two or more, fitted to this log, best first; the first three are compared.
     seed
         Of random excitations.
-
-    Returns
-    -------
-    str or None
-        None when there's nothing to tell apart.
     """
     distinct = different(candidates)
     if len(distinct) < 2:

@@ -41,16 +41,13 @@ def share_of_own_signal(simulated: Real, residual: Real) -> Real:
     A noise floor that comes from what no linear model explains holds a sensor's distortion and its steps too, and
     nothing would ever stand out of it. What the signal itself explains is a gain's or a parameter's. A curve of many
     points takes some of any noise: variances are those of the degrees of freedom that are left, the *adjusted* R^2 of
-    Ezekiel (1930), which is zero on average for noise of any length.
+    Ezekiel (1930), which is zero on average for noise of any length. It's ``[output]``, up to 1, and below 0 where
+    the signal explains less than chance would.
 
     Parameters
     ----------
     simulated, residual
         ``[output, sample]``.
-
-    Returns
-    -------
-    ``[output]`` up to 1; below 0 where it explains less than chance would.
     """
     found = np.zeros(len(simulated))
     for row, (signal, left) in enumerate(zip(simulated, residual, strict=True)):

@@ -38,12 +38,7 @@ def closing_elsewhere(study: Study, causes: Causes, measurement: Measurement, *,
     """Say how far the gap closes on another log, with parameters and effects as the first log told them.
 
     Only the state that the log begins in (each window, as on the first log) and the outputs' constants are estimated,
-    on stretches that aren't judged.
-
-    Returns
-    -------
-    Closing or None
-        None where the model diverges on that log.
+    on stretches that aren't judged. There's None where the model diverges on that log.
     """
     measurement = with_period(measurement)
     windows = None if study.windows is None else short_windows(study.model, measurement)
