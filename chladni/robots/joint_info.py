@@ -266,7 +266,7 @@ def _motion(joints: Sequence[JointInfo]) -> Iterator[str]:
         yield "no joint moves enough to tell its friction or inertia; record a larger motion"
     elif still:
         yield (
-            f"{_some([one.joint.name for one in still])}: hardly moves against its encoder's steps; friction, "
+            f"{_some([one.joint.name for one in still])}: hardly any motion against the encoder's steps; friction, "
             "inertia and play there can't be told"
         )
 

@@ -239,7 +239,8 @@ class _Reader:
         if kinds:
             # An effort beside a position is fed forward, or nobody fills it.
             kind: CommandKind = "velocity" if servos == {"velocity"} and "velocity" in kinds else kinds[0]
-            return kind, f"of {', '.join(kinds)} that it holds; command_kind in [log] of a robot file says another"
+            beside = " and ".join(one for one in kinds if one != kind)
+            return kind, f"though it holds {beside}, too; command_kind in [log] of a robot file says another"
         for kind in get_args(CommandKind):
             if kind in command.label.lower():
                 return kind, "as its topic says"

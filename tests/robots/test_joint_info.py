@@ -96,7 +96,7 @@ def test_joints_that_hardly_move_are_told(tmp_path: Path) -> None:
     position[1] = 0.3
     found = told(tmp_path, [states(position=encoded(position)), commands()])
     assert [one.still for one in found.joints] == [True, True, False]
-    assert "shoulder, elbow: hardly moves against its encoder's steps" in findings(found)
+    assert "shoulder, elbow: hardly any motion against the encoder's steps" in findings(found)
     still = told(tmp_path, [states(position=np.full((3, 1000), 0.3)), commands()])
     assert "no joint moves enough" in findings(still)
 

@@ -71,5 +71,5 @@ def _of_joints(solved: Solved) -> list[str]:
         if driven and there < _MOVES
     ]
     if still:
-        found.append(f"{some_of(still)}: hardly moves; move it over more to tell its friction, inertia and drive")
+        found.append(f"{some_of(still)}: hardly any motion; move more there to tell friction, inertia and drive")
     return found
