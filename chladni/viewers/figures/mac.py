@@ -28,7 +28,7 @@ def mac_figures(study: Study) -> dict[str, Figure]:
         return {}
     names = mode_ticks(modes)
     figure = cross_mac_figure(
-        validation.auto_mac, rows=names, columns=names, row_name="Mode: Hz", column_name="Mode: Hz"
+        validation.auto_mac, rows=names, columns=names, row_name="Mode: frequency [Hz]", column_name="Mode: Hz"
     )
     return {"mac": figure}
 

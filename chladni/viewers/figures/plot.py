@@ -257,7 +257,7 @@ def _(value: ModeSet) -> list[Picture]:
     if not value.frequency_hz.size:
         return []
     height_in = 0.9 + CELL_IN * len(value.channels)
-    return [Picture((Part(height_in, partial(_draw_shapes, modes=value)),), "Mode: Hz")]
+    return [Picture((Part(height_in, partial(_draw_shapes, modes=value)),), "Mode: frequency [Hz]")]
 
 
 @pictures.register
