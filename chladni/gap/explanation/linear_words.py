@@ -2,8 +2,9 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Self
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from chladni.gap.explanation.screen import Regression, Screened
 from chladni.gap.location.locate import Location, tuned_stepwise
 from chladni.gap.location.profile import Elimination, Profile, profiled
 from chladni.gap.plant.black_box import BlackBox
-from chladni.gap.plant.linear_problem import LinearProblem, with_further
+from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import sites_of
+from chladni.gap.plant.tunable import Scaled
 from chladni.gap.side_by_side import side_by_side
 from chladni.gap.tuning.effect_scale import effect_numbers, with_numbers
 from chladni.models.core.compiled_model import CompiledModel
@@ -90,13 +92,44 @@ def fitted_beside(model: Model, location: Location, effect: AttachedEffect, z: R
     return LinearFit(effect=_moved(start, found.z[z.size :]), z=found.z[: z.size], chi=found.chi)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Numbered:
+    """A model with an effect whose numbers stand behind its parameters in z: implements `Varied` and `Scaled`."""
+
+    model: Model
+    effect: AttachedEffect
+    tunables: Scaled
+    further: tuple[str, ...]
+    given: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.tunables.names, *self.further)
+
+    def wrong(self, z: Real) -> tuple[str, ...]:
+        return self.tunables.wrong(z[: len(self.tunables.names)])
+
+    def limits(self, freed: Collection[str] = ()) -> Real:
+        return np.concatenate([self.tunables.limits(freed), np.full(len(self.further), np.inf)])
+
+    def values(self, z: Real) -> dict[str, float]:
+        own = len(self.tunables.names)
+        return {**self.tunables.values(z[:own]), **dict(zip(self.further, z[own:].tolist(), strict=True))}
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        return replace(self, given={**self.given, **values})
+
+    def compile(self) -> CompiledModel:
+        parameters = {name: one for name, one in self.given.items() if name not in self.further}
+        effect = _moved(self.effect, np.array([self.given.get(name, 0.0) for name in self.further]))
+        return self.model.with_values(parameters).with_effects((*self.model.effects, effect)).compile()
+
+
 def _beside(problem: LinearProblem, model: Model, effect: AttachedEffect) -> LinearProblem:
     """Give the problem with the effect's numbers behind its parameters."""
-
-    def make(parameters: Mapping[str, float], further: Real) -> CompiledModel:
-        return model.with_values(parameters).with_effects((*model.effects, _moved(effect, further))).compile()
-
-    return with_further(problem, len(effect_numbers((effect,))), make)
+    further = tuple(f"further {place}" for place in range(len(effect_numbers((effect,)))))
+    numbered = _Numbered(model=model, effect=effect, tunables=problem.tunables, further=further)
+    return LinearProblem(numbered, problem.measurement, problem.noise, numbered, problem.lines)
 
 
 def _moved(effect: AttachedEffect, further: Real) -> AttachedEffect:
