@@ -45,7 +45,7 @@ def of_a_pulled_mass(one: Pulled) -> str:
     way = "more" if one.change > 0 else "less"
     instead = f", or as well at {some_of(one.instead)}" if one.instead else ""
     return (
-        f"the log asks for {abs(one.change):.2g} ± {one.std:.1g} kg {way} at {whose}{instead}, "
+        f"the log asks for {engineering(abs(one.change), one.std, 'kg')} {way} at {whose}{instead}, "
         f"{abs(one.over_tolerance):.2g} times the tolerance, which holds it back; weigh it, or raise inertia under "
         "[tolerance]"
     )
