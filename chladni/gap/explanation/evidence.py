@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chladni.gap.calibration import DETAILS, DOUBT, ELSEWHERE, OPEN, SIGMAS, SIZE, SLIP, UNUSUAL, USUAL, ZERO
-from chladni.gap.location.profile import Elimination, Profile
+from chladni.gap.location.profile import Elimination, Profile, Projection, Shared
 from chladni.gap.plant.free_run import FreeRun
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.linear_view import View
@@ -174,21 +174,21 @@ def left_of(problem: LinearProblem, run: FreeRun, fit: OutputErrorFit, detailed:
     missed[:, : run.unknown_at_start(fit.z, fit.effects)] = 0.0
     residual = lines.spectrum(missed) * weight
     missing = np.asarray((problem.measured - plain.forced()) * weight, dtype=np.complex128)
-    (along, across), out = _split(view, measurement.output_names, detailed, weight, residual)
-    (force, _), without = _split(plain, measurement.output_names, detailed, weight, missing)
-    count, taken = lines.index.size, sum(out.taken)
+    found, sites = _split(view, measurement.output_names, detailed, weight, residual)
+    without, _ = _split(plain, measurement.output_names, detailed, weight, missing)
+    count, taken = lines.index.size, sum(found.taken)
     return Left(
-        along=along,
+        along=found.whole - found.rest,
         along_expected=taken,
-        across=across,
+        across=found.rest,
         across_expected=max(float(residual.size) - taken, 0.0),
-        force=force,
+        force=without.whole - without.rest,
         doubt=doubt_of(problem.noise),
-        sites=out.count,
+        sites=sites,
         outputs=tuple((np.sum(np.abs(residual) ** 2, axis=(1, 2)) / count).tolist()),
-        along_outputs=out.taken,
-        own=_shares(out.own(residual), along, taken),
-        own_force=_shares(without.own(missing), force, taken),
+        along_outputs=found.taken,
+        own=_shares(found.own, found.whole - found.rest, taken),
+        own_force=_shares(without.own, without.whole - without.rest, sum(without.taken)),
     )
 
 
@@ -221,16 +221,18 @@ def left_by_force(problem: LinearProblem, tuned: Profile, found: Profile) -> Lef
 
 def _split(
     view: View, outputs: Sequence[str], names: Sequence[str], weight: Real, residual: Complex
-) -> tuple[tuple[float, float], Elimination]:
-    """Energy along the forces at some sites, and the rest; what takes them."""
+) -> tuple[Shared, int]:
+    """Share a residual among forces at some sites, and count the places of these."""
     sites = [site for site in sites_of(view.compiled, outputs) if site.name in names]
     printed = [view.pattern(way_to(view, site, outputs))[:, None] * weight for site in sites]
     # Laws that print alike leave the details of one force: nothing tells whose they are.
     patterns = [printed[alike[0]] for alike in printed_alike(printed, view.rounding)]
     transients = view.transients()[:, :, None] * weight
+    if len(patterns) > 1:
+        return Projection(patterns).shared(Elimination([], transients).settled(residual)), len(patterns)
     plain, out = (Elimination(some, transients) for some in ([], patterns))
-    whole, across = (float(np.sum(one.rest(residual) ** 2)) for one in (plain, out))
-    return (whole - across, across), out
+    whole, rest = (float(np.sum(one.rest(residual) ** 2)) for one in (plain, out))
+    return Shared(whole=whole, rest=rest, taken=out.taken, own=np.zeros(len(patterns))), len(patterns)
 
 
 def freedom_nats(

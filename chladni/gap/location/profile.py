@@ -36,7 +36,7 @@ class Profile:
     taken
         Of each output the energy of its noise that the forces take; empty without any.
     own
-        ``[site]`` see `Elimination.own`; empty where that wasn't asked, or of one force alone.
+        ``[site]`` see `Shared`; empty where that wasn't asked, or of one force alone.
     """
 
     sites: tuple[Site, ...]
@@ -60,6 +60,27 @@ class Profile:
         return 2.0 * self.misfit + self.prior
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shared:
+    """A residual as forces at some sites share it, that know nothing of each other.
+
+    Attributes
+    ----------
+    whole, rest
+        Energy of the residual without transients, and of what the forces leave of it.
+    taken
+        Of each output the energy of its noise that the forces take.
+    own
+        ``[site]`` energy that each prints alone, beyond its noise of one: of forces that print almost alike far more
+        than all of them together.
+    """
+
+    whole: float
+    rest: float
+    taken: tuple[float, ...]
+    own: Real
+
+
 class Projection:
     """Takes from whitened spectra what forces of any shape at some sites can print.
 
@@ -68,8 +89,7 @@ class Projection:
 
     def __init__(self, patterns: Sequence[Complex]) -> None:
         self._unit = _orthonormal(patterns)
-        #: Of the forces.
-        self.count = len(self._unit)
+        self._patterns = np.asarray(patterns, dtype=np.complex128)
 
     @property
     def taken(self) -> tuple[float, ...]:
@@ -88,13 +108,43 @@ class Projection:
             spectra = np.subtract(spectra, printed, out=printed)
         return spectra
 
+    def shared(self, left: Complex) -> Shared:
+        """Split a residual ``[output, segment, line]`` without transients among the forces, and the rest.
+
+        Forces know nothing of each other: each is Gaussian, with the power of its own that makes the residual most
+        probable (variance components by majorising and minimising: Zhou, Hu, Zhou and Lange 2019). What only forces
+        that work against each other could print stays with the rest.
+        """
+        unit, gram = self._units()
+        toward = np.einsum("aol,oml->lam", unit.conj(), left)
+        power = np.full(len(unit), float(np.sum(np.abs(left) ** 2)) / left[0].size / len(unit))
+        for _ in range(MOST_STEPS):
+            _, shapes, over, beside = _beside_noise(gram, toward, power)
+            expected = np.mean(np.einsum("lak,lk->la", np.abs(shapes) ** 2, over / (1.0 + over)), axis=0)
+            found = np.mean(np.abs(beside) ** 2, axis=(0, 2))
+            power = power * np.sqrt(found / np.maximum(expected, ZERO))
+        root, shapes, over, beside = _beside_noise(gram, toward, power)
+        rest = left - np.einsum("aol,lam->oml", unit, root[:, None] * beside)
+        forms = np.einsum("aol,lak->olk", unit, root[:, None] * shapes)
+        return Shared(
+            whole=float(np.sum(np.abs(left) ** 2)),
+            rest=float(np.sum(np.abs(rest) ** 2)),
+            taken=tuple(np.sum(np.abs(forms) ** 2 / (1.0 + over), axis=(1, 2)).tolist()),
+            own=np.asarray(power * left[0].size, dtype=np.float64),
+        )
+
+    def _units(self) -> tuple[Complex, Complex]:
+        """``[site, output, line]`` patterns of energy one, and ``[line, site, site]`` their products."""
+        size = np.sqrt(np.sum(np.abs(self._patterns) ** 2, axis=1, keepdims=True))
+        unit = (self._patterns / np.where(size > 0, size, 1.0))[:, :, 0]
+        return unit, np.einsum("aol,bol->lab", unit.conj(), unit)
+
 
 class Elimination(Projection):
     """Takes transients ``[state, output, 1, line]`` from whitened spectra, too; see `Projection`."""
 
     def __init__(self, patterns: Sequence[Complex], transients: Complex) -> None:
         super().__init__(patterns)
-        self._patterns = np.asarray(patterns, dtype=np.complex128)
         self._transients = transients
         stacked = _real(self.away(transients))[:, 0]
         size = np.sqrt(np.einsum("sn,sn->s", stacked, stacked))
@@ -128,32 +178,9 @@ class Elimination(Projection):
             return transient, []
         return transient, list(_forces(self._patterns, self._without(transient, residual)))
 
-    def own(self, residual: Complex) -> Real:
-        """``[site]`` energy that a force at each site prints of a residual, beyond its noise of one.
-
-        Each force is Gaussian, with a power of its own: those that make the residual most probable (variance
-        components by majorising and minimising: Zhou, Hu, Zhou and Lange 2019). Forces that print almost alike may
-        work against each other: then each alone prints far more than all of them together.
-        """
-        if len(self._patterns) < 2:
-            return np.zeros(len(self._patterns))
-        left = self._without(self.unknowns(residual)[0], residual)
-        size = np.sqrt(np.sum(np.abs(self._patterns) ** 2, axis=1, keepdims=True))
-        unit = (self._patterns / np.where(size > 0, size, 1.0))[:, :, 0]
-        gram = np.einsum("aol,bol->lab", unit.conj(), unit)
-        toward = np.einsum("aol,oml->lam", unit.conj(), left)
-        power = np.full(len(unit), float(np.sum(np.abs(left) ** 2)) / left[0].size / len(unit))
-        for _ in range(MOST_STEPS):
-            root = np.sqrt(power)
-            # Over the noise of one; where forces print alike, rounding makes a bit less than nothing of what differs.
-            printed, shapes = np.linalg.eigh(root[:, None] * gram * root)
-            printed = np.maximum(printed, 0.0)
-            beside = np.einsum("lka,lam->lkm", shapes.conj().swapaxes(1, 2), root[:, None] * toward)
-            beside = np.einsum("lak,lkm->lam", shapes, beside / (1.0 + printed)[:, :, None])
-            expected = np.mean(np.einsum("lak,lk->la", np.abs(shapes) ** 2, printed / (1.0 + printed)), axis=0)
-            found = np.mean(np.abs(beside) ** 2, axis=(0, 2))
-            power = power * np.sqrt(found / np.maximum(expected, ZERO))
-        return np.asarray(power * left[0].size, dtype=np.float64)
+    def settled(self, residual: Complex) -> Complex:
+        """Take the best transients, beside forces of any shape, from ``[output, segment, line]``."""
+        return self._without(self.unknowns(residual)[0], residual)
 
     def _without(self, transient: Real, residual: Complex) -> Complex:
         """A residual but for transients ``[state, segment]``."""
@@ -168,6 +195,20 @@ class _Fit:
     profile: Profile
     out: Elimination
     residual: Complex
+
+
+def _beside_noise(gram: Complex, toward: Complex, power: Real) -> tuple[Real, Complex, Real, Complex]:
+    """Forces of some power beside a noise of one, from their patterns' products with each other and a residual.
+
+    RMS ``[site]``; shapes ``[line, site, form]`` that print apart, and ``[line, form]`` energy of each over noise;
+    ``[line, site, segment]`` most probable forces over their RMS.
+    """
+    root = np.sqrt(power)
+    over, shapes = np.linalg.eigh(root[:, None] * gram * root)
+    # Where forces print alike, rounding makes a bit less than nothing of what differs.
+    over = np.maximum(over, 0.0)
+    forms = np.einsum("lka,lam->lkm", shapes.conj().swapaxes(1, 2), root[:, None] * toward)
+    return root, shapes, over, np.einsum("lak,lkm->lam", shapes, forms / (1.0 + over)[:, :, None])
 
 
 def _forces(patterns: Complex, left: Complex) -> Complex:
@@ -235,7 +276,7 @@ def profiled(
 def with_own(problem: LinearProblem, found: Profile) -> Profile:
     """Give a profile with what each of its forces prints alone."""
     fit = _fitted(problem, found.sites, found.z)
-    return replace(found, own=tuple(fit.out.own(fit.residual).tolist()))
+    return replace(found, own=tuple(fit.out.shared(fit.out.settled(fit.residual)).own.tolist()))
 
 
 def promises(problem: LinearProblem, sites: Sequence[Site], z: Real, limits: Sequence[Real]) -> list[_Promise]:

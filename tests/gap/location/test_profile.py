@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chladni.gap.calibration import LAW_ERROR
-from chladni.gap.location.profile import Elimination, bounded_minimum, profile_at, profiled
+from chladni.gap.location.profile import Elimination, Projection, bounded_minimum, profile_at, profiled
 from chladni.gap.plant.linear_problem import LinearProblem
 from chladni.gap.plant.places import Site
 from chladni.gap.plant.record_lines import all_lines, segment_lines
@@ -163,23 +163,39 @@ def test_a_force_s_own_energy_is_what_it_prints_alone(angle):
     patterns = np.array([[1.0, 0.0], [np.cos(angle), np.sin(angle)]])[:, :, None, None] * np.ones((1, 2, 1, lines))
     white = (rng.standard_normal((5, lines)) + 1j * rng.standard_normal((5, lines))) * size
     noise, pushes = white[:2], np.array([40.0, 30.0])[:, None] * white[2:4]
-    out = Elimination(patterns, np.zeros((1, 2, 1, lines), dtype=complex))
+    out = Projection(patterns)
     both = np.einsum("sol,sl->ol", patterns[:, :, 0], pushes) + noise
-    own = out.own(both[:, None])
+    own = out.shared(both[:, None]).own
     np.testing.assert_allclose(own, [40.0**2 * lines, 30.0**2 * lines], rtol=0.1)
     # What only their difference prints is small beside each of them, where they print almost alike.
     apart = patterns[0, :, 0] - patterns[1, :, 0]
-    against = out.own((600.0 * apart * white[4] + noise)[:, None])
+    against = out.shared((600.0 * apart * white[4] + noise)[:, None]).own
     whole = np.sum(np.abs(600.0 * apart * white[4]) ** 2)
     assert (against.sum() > 100.0 * whole) == (angle < 1.0)
     # Noise has neither.
-    assert out.own(noise[:, None]).sum() < 0.1 * 2 * lines
+    assert out.shared(noise[:, None]).own.sum() < 0.1 * 2 * lines
+
+
+def test_what_only_forces_against_each_other_could_print_is_the_rest():
+    # The first sensor feels both, the second hardly the one of them: what's there is no force's that the other hides.
+    rng = np.random.default_rng(0)
+    lines = 2000
+    patterns = np.array([[1.0, 0.0], [1.0, 0.02]])[:, :, None, None] * np.ones((1, 2, 1, lines))
+    white = (rng.standard_normal((2, 1, lines)) + 1j * rng.standard_normal((2, 1, lines))) / np.sqrt(2)
+    out = Projection(patterns)
+    hidden = out.shared(np.array([1.0, 3.0])[:, None, None] * white)
+    assert hidden.rest - hidden.whole > -0.1 * lines
+    assert sum(hidden.taken) < 0.1 * lines
+    # One that acts shows on both, and leaves less than noise of the first.
+    acting = out.shared(np.array([1.0, 0.02])[:, None, None] * 500.0 * white[0] + white)
+    assert acting.rest == pytest.approx(lines, rel=0.1)
+    assert sum(acting.taken) == pytest.approx(lines, rel=0.1)
 
 
 def test_forces_that_print_the_same_share_what_they_print_however_much_it_is():
     # A run that left the machine's: rounding takes the noise of one beside it.
     patterns = np.ones((2, 2, 1, 50)) * np.array([1.0, 0.5])[:, None, None]
-    out = Elimination(patterns, np.zeros((1, 2, 1, 50), dtype=complex))
+    out = Projection(patterns)
     for size in (1e2, 1e9, 1e12):
-        own = out.own(size * patterns[0].astype(complex))
+        own = out.shared(size * patterns[0].astype(complex)).own
         assert own.sum() == pytest.approx(50 * 1.25 * size**2, rel=1e-3)
