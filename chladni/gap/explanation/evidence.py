@@ -204,18 +204,18 @@ def _shares(own: Real, energy: float, noise: float) -> tuple[float, ...]:
 
 def left_by_force(problem: LinearProblem, tuned: Profile, found: Profile) -> Left:
     """Give what a force of any shape at some sites leaves; `tuned` is the profile without."""
-    share = min(len(found.sites) / len(problem.measured), 1.0)
+    along, noise = max(tuned.misfit - found.misfit, 0.0), tuned.expected - found.expected
     return Left(
-        along=max(tuned.misfit - found.misfit, 0.0),
-        along_expected=tuned.expected * share,
+        along=along,
+        along_expected=noise,
         across=found.misfit,
-        across_expected=tuned.expected * (1.0 - share),
+        across_expected=found.expected,
         # Of a force of any shape nothing is unusual.
         force=np.inf,
         doubt=doubt_of(problem.noise),
         sites=len(found.sites),
         along_outputs=found.taken,
-        own=_shares(np.array(found.own), tuned.misfit - found.misfit, tuned.expected * share),
+        own=_shares(np.array(found.own), along, noise),
     )
 
 

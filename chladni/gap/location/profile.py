@@ -274,9 +274,11 @@ def profiled(
 
 
 def with_own(problem: LinearProblem, found: Profile) -> Profile:
-    """Give a profile with what each of its forces prints alone."""
+    """Give a profile of forces that know nothing of each other: each with what it prints alone."""
     fit = _fitted(problem, found.sites, found.z)
-    return replace(found, own=tuple(fit.out.shared(fit.out.settled(fit.residual)).own.tolist()))
+    shared = fit.out.shared(fit.out.settled(fit.residual))
+    expected = max(float(fit.residual.size) - sum(shared.taken), 1.0)
+    return replace(found, misfit=shared.rest, expected=expected, taken=shared.taken, own=tuple(shared.own.tolist()))
 
 
 def promises(problem: LinearProblem, sites: Sequence[Site], z: Real, limits: Sequence[Real]) -> list[_Promise]:
