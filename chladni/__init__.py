@@ -44,9 +44,9 @@ _HOME = {
     "diagnose_simulator": "chladni.gap.diagnosis.of_simulator",
     "Diagnosis": "chladni.gap.records.diagnosis",
     "Measurement": "chladni.gap.records.measurement",
-    "callable_simulator": "chladni.gap.simulators.callable_simulator",
-    "MujocoSimulator": "chladni.gap.simulators.mujoco_simulator",
-    "mujoco_simulator": "chladni.gap.simulators.mujoco_simulator",
+    "callable_simulator": "chladni.models.simulators.callable_simulator",
+    "MujocoSimulator": "chladni.models.simulators.mujoco_simulator",
+    "mujoco_simulator": "chladni.models.simulators.mujoco_simulator",
     "read_uff_modes": "chladni.io.files.uff_modes",
     "write_uff": "chladni.io.files.uff_modes",
     "write_uff_modes": "chladni.io.files.uff_modes",
@@ -249,9 +249,6 @@ if TYPE_CHECKING:
     from chladni.gap.diagnosis.of_simulator import diagnose_simulator as diagnose_simulator
     from chladni.gap.records.diagnosis import Diagnosis as Diagnosis
     from chladni.gap.records.measurement import Measurement as Measurement
-    from chladni.gap.simulators.callable_simulator import callable_simulator as callable_simulator
-    from chladni.gap.simulators.mujoco_simulator import MujocoSimulator as MujocoSimulator
-    from chladni.gap.simulators.mujoco_simulator import mujoco_simulator as mujoco_simulator
     from chladni.io.files.uff_modes import read_uff_modes as read_uff_modes
     from chladni.io.files.uff_modes import write_uff as write_uff
     from chladni.io.files.uff_modes import write_uff_modes as write_uff_modes
@@ -323,6 +320,9 @@ if TYPE_CHECKING:
     from chladni.models.schemes.block import element_block as element_block
     from chladni.models.schemes.scheme_model import SchemeModel as SchemeModel
     from chladni.models.schemes.scheme_output import SchemeOutput as SchemeOutput
+    from chladni.models.simulators.callable_simulator import callable_simulator as callable_simulator
+    from chladni.models.simulators.mujoco_simulator import MujocoSimulator as MujocoSimulator
+    from chladni.models.simulators.mujoco_simulator import mujoco_simulator as mujoco_simulator
     from chladni.models.structures.robot_arm import robot_arm as robot_arm
     from chladni.models.structures.structure_input import StructureInput as StructureInput
     from chladni.models.structures.structure_model import StructureModel as StructureModel

@@ -5,12 +5,12 @@ from typing import TypeVar
 
 from chladni.gap.comparison.measuring import measurement_of
 from chladni.gap.records.diagnosis import PARAMETER, Cause, Diagnosis
-from chladni.gap.simulators.simulator import Simulator
-from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.io.source import SeriesLike, log_or_series, series_of
 from chladni.models.core.model import Effect, Model
 from chladni.models.effects.attached_effect import attached
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.simulators.simulator import Simulator
+from chladni.models.simulators.wrapped_simulator import WrappedSimulator
 
 ModelT = TypeVar("ModelT", bound=Model)
 

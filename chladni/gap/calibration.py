@@ -253,8 +253,6 @@ RUNAWAY = cbrt(float_info.max)
 GRID = 1024
 #: Steps between samples of a model with laws.
 PARTS = 8
-#: Velocity or acceleration beyond all physics, SI, before MuJoCo takes it for a mistake at 1e10.
-LARGEST = 1e8
 
 # Memory and threads.
 

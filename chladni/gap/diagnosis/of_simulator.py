@@ -6,10 +6,10 @@ from dataclasses import replace
 from chladni.gap.comparison.measuring import measurement_of
 from chladni.gap.diagnosis.diagnose import diagnose
 from chladni.gap.records.diagnosis import Diagnosis
-from chladni.gap.simulators.simulator import Simulator
-from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.io.source import SeriesLike, series_of
 from chladni.models.effects.effect_kind import EffectKind
+from chladni.models.simulators.simulator import Simulator
+from chladni.models.simulators.wrapped_simulator import WrappedSimulator
 from chladni.signals.renamed import renamed
 
 

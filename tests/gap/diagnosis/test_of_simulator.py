@@ -9,18 +9,18 @@ import pytest
 import chladni
 from chladni.apps.explained_model import explained_simulator
 from chladni.gap.diagnosis.of_simulator import diagnose_simulator
-from chladni.gap.simulators.mujoco_simulator import mujoco_simulator
-from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.effects.attaching import LawAtPort
 from chladni.models.effects.catalogue import CATALOGUE, FAMILIES
 from chladni.models.effects.effect_kind import EffectKind, Variant
 from chladni.models.excitations.multisine import Multisine
+from chladni.models.simulators.mujoco_simulator import mujoco_simulator
+from chladni.models.simulators.wrapped_simulator import WrappedSimulator
 from chladni.signals.channel import Channel
 from chladni.signals.errors import LogError, ModelError
 from chladni.signals.time_series import TimeSeries
 from tests.gap.arm import all_but, among_few
-from tests.gap.simulators.slide import mjcf
+from tests.models.simulators.slide import mjcf
 
 pytest.importorskip("mujoco", reason="needs the extra [mujoco]")
 

@@ -15,12 +15,12 @@ from chladni.gap.plant.record_lines import all_lines, segment_lines
 from chladni.gap.plant.tunable import Tunables
 from chladni.gap.records.measurement import Measurement
 from chladni.gap.records.noise_floor import NoiseFloor
-from chladni.gap.simulators.callable_simulator import callable_simulator
-from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Terminal
 from chladni.models.integrator.integrator import Integrator
-from tests.gap.simulators.slide import STIFFNESS, in_python, model
+from chladni.models.simulators.callable_simulator import callable_simulator
+from chladni.models.simulators.wrapped_simulator import WrappedSimulator
+from tests.models.simulators.slide import STIFFNESS, in_python, model
 
 RATE_HZ, SAMPLES = 100.0, 600
 

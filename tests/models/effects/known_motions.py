@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from chladni.gap.simulators.wrapped_simulator import equations
 from chladni.models.core.port import Port
 from chladni.models.effects.trial import TrialMotion
+from chladni.models.simulators.wrapped_simulator import equations
 
 RATE_HZ, SAMPLES = 1000.0, 4000
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.gap.simulators.callable_simulator import callable_simulator
-from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.models.core.port import Port, Terminal
 from chladni.models.integrator.integrator import Integrator
+from chladni.models.simulators.callable_simulator import callable_simulator
+from chladni.models.simulators.wrapped_simulator import WrappedSimulator
 from chladni.signals.errors import ModelError
-from tests.gap.simulators.slide import RATE_HZ, in_python, model, smooth
+from tests.models.simulators.slide import RATE_HZ, in_python, model, smooth
 
 U, Y = Terminal(name="u", unit="N"), Terminal(name="y", unit="m")
 

@@ -7,11 +7,11 @@ from typing import Protocol
 
 import numpy as np
 
-from chladni.gap.simulators.joint_law import JointLaw, RunningLaw
-from chladni.gap.simulators.simulator import SimulatorResponse
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Port, Terminal
 from chladni.models.core.simulation import PortMotion
+from chladni.models.simulators.joint_law import JointLaw, RunningLaw
+from chladni.models.simulators.simulator import SimulatorResponse
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 

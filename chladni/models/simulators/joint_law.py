@@ -3,8 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from chladni.gap.calibration import SLIGHT, UNNOTICED
 from chladni.models.core.port_law import PortLaw
+
+#: Of a law's state, or of `LEAST_STATE` where that is more: the step of the difference that tells how stiff it is.
+NUDGE = 1e-6
+LEAST_STATE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +76,7 @@ def _advance(law: PortLaw, state: list[float], d: float, s: float, t: float, ste
     moved = []
     # A bristle bends within microns, far stiffer than the simulator's step: linearly implicit, state by state.
     for place, value in enumerate(state):
-        nudge = UNNOTICED * max(abs(value), SLIGHT)
+        nudge = NUDGE * max(abs(value), LEAST_STATE)
         nudged, rates_there = list(state), [0.0] * len(state)
         nudged[place] = value + nudge
         law.function(d, s, t, law.parameters, nudged, rates_there)

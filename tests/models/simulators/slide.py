@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from chladni.gap.simulators.callable_simulator import callable_simulator
 from chladni.models.core.parameter import Parameter, Parameters
 from chladni.models.core.port import Port, Terminal
+from chladni.models.simulators.callable_simulator import callable_simulator
 from chladni.models.structures.structure import Body, Joint, Structure
 from chladni.models.structures.structure_input import StructureInput
 from chladni.models.structures.structure_model import StructureModel

@@ -6,14 +6,14 @@ from typing import Self
 
 import numpy as np
 
-from chladni.gap.simulators.joint_law import JointLaw
-from chladni.gap.simulators.simulator import RefinableSimulator, Simulator, SimulatorResponse
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Effect, ModelKind
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import HoldKind, Port, Terminal
 from chladni.models.core.simulation import Simulation
 from chladni.models.effects.wording import nearest
+from chladni.models.simulators.joint_law import JointLaw
+from chladni.models.simulators.simulator import RefinableSimulator, Simulator, SimulatorResponse
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 

@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from chladni.gap.calibration import SOME
 from chladni.models.core.parameter import Parameter
 from chladni.models.effects.wording import nearest
 from chladni.signals.errors import ModelError
+
+#: Of a number: how far down, and one over it how far up, it usually goes.
+_USUAL = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +68,7 @@ def parameter(model: Any, name: str, tolerance: float) -> Parameter:
             "a value other than zero, or leave it out"
         )
     rotates = number.kind == "joint" and turns(model, index(model, "joint", name.rpartition(".")[0]))
-    far = sorted((SOME * value, value / SOME))
+    far = sorted((_USUAL * value, value / _USUAL))
     least = 0.0 if number.array != "actuator_gear" else -inf
     return Parameter(
         name=name,

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, Self, runtime_checkable
 
-from chladni.gap.simulators.joint_law import JointLaw
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Port, Terminal
 from chladni.models.core.simulation import PortMotion
+from chladni.models.simulators.joint_law import JointLaw
 from chladni.signals.arrays import Real
 from chladni.signals.value import Value
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.gap.simulators.joint_law import JointLaw
-from chladni.gap.simulators.mujoco_simulator import mujoco_simulator
-from chladni.gap.simulators.wrapped_simulator import WrappedSimulator
 from chladni.models.core.port_law import PortLaw
 from chladni.models.integrator.integrator import Integrator
+from chladni.models.simulators.joint_law import JointLaw
+from chladni.models.simulators.mujoco_simulator import mujoco_simulator
+from chladni.models.simulators.wrapped_simulator import WrappedSimulator
 from chladni.signals.errors import ModelError
-from tests.gap.simulators.slide import DAMPING, MASS, RATE_HZ, STIFFNESS, held, mjcf, model, smooth
+from tests.models.simulators.slide import DAMPING, MASS, RATE_HZ, STIFFNESS, held, mjcf, model, smooth
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra [mujoco]")
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from chladni.gap.simulators.joint_law import JointLaw
 from chladni.models.core.port_law import PortLaw
 from chladni.models.effects.coulomb_friction import bristle, regularised
 from chladni.models.effects.quadratic_damping import quadratic
+from chladni.models.simulators.joint_law import JointLaw
 
 
 def test_forces_add_up():

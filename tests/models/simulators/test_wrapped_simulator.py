@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import chladni
-from chladni.gap.simulators.wrapped_simulator import joint_law, with_signals_changed
 from chladni.models.core.port import Port, Terminal
 from chladni.models.effects.catalogue import CATALOGUE
+from chladni.models.simulators.wrapped_simulator import joint_law, with_signals_changed
 from chladni.signals.errors import ModelError
 
 RATE_HZ = 100.0

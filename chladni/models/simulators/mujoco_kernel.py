@@ -5,9 +5,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from chladni.gap.calibration import LARGEST, MOST_STEPS, ROUNDING, SLIGHT, UNNOTICED
 from chladni.models.integrator.machine_code import call_law, caller, machine_code, part_code
+from chladni.models.simulators.joint_law import LEAST_STATE, NUDGE
 from chladni.signals.arrays import Real, Whole
+
+#: Velocity or acceleration beyond all physics, SI, before MuJoCo takes it for a mistake at 1e10.
+LARGEST = 1e8
+#: Of a law's force: what its search ends at, which takes a few steps and never so many.
+_ROUNDING, _MOST_STEPS = 1e-9, 60
 
 _WORD = types.int64
 _STEP: Any = caller(_WORD(_WORD, _WORD))
@@ -108,7 +113,7 @@ def advanced_force(laws: Laws, joint: int, d: float, s: float, t: float, step_s:
             call_law(function, d, s, t, numbers, nudged, rates)
         for place in range(start, start + count):
             value, rate = laws.state[place], laws.rates[place]
-            nudge = UNNOTICED * max(abs(value), SLIGHT)
+            nudge = NUDGE * max(abs(value), LEAST_STATE)
             laws.nudged[place] = value + nudge
             call_law(function, d, s, t, numbers, nudged, rates)
             slope = min((laws.rates[place] - rate) / nudge, 0.0)
@@ -143,11 +148,11 @@ def implicit_force(
         # It falls with speed by more than the inertia in one step: what it is at the explicit step must do.
         return force
     side = 0
-    for _ in range(MOST_STEPS):
+    for _ in range(_MOST_STEPS):
         middle = (low * over - high * under) / (over - under)
         force = advanced_force(laws, joint, d, middle, t, step_s)
         left = middle - s - step_s * free + drop * force
-        if abs(left) <= ROUNDING * size:
+        if abs(left) <= _ROUNDING * size:
             break
         if left * over > 0.0:
             high, over = middle, left

@@ -12,17 +12,18 @@ from typing import Any, Self
 
 import numpy as np
 
-from chladni.gap.calibration import UNNOTICED
-from chladni.gap.simulators.joint_law import JointLaw
-from chladni.gap.simulators.mujoco_numbers import index, names, parameter, set_number, turns
-from chladni.gap.simulators.simulator import SimulatorResponse
 from chladni.models.core.parameter import Parameters
 from chladni.models.core.port import Port, Terminal
 from chladni.models.core.simulation import PortMotion
 from chladni.models.effects.wording import nearest
+from chladni.models.simulators.joint_law import JointLaw
+from chladni.models.simulators.mujoco_numbers import index, names, parameter, set_number, turns
+from chladni.models.simulators.simulator import SimulatorResponse
 from chladni.signals.arrays import Real
 from chladni.signals.errors import ModelError
 
+#: Of an interval: so little apart steps and samples fall together.
+_TIE = 1e-6
 #: MuJoCo's integrators that step in two halves, between which laws can act.
 _INTEGRATORS = ("Euler", "implicit", "implicitfast")
 _FUNCTIONS = ("mj_step1", "mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM", "mj_step2")
@@ -234,7 +235,7 @@ def _split(name: str) -> tuple[str, int | None]:
 
 def _steps(step_s: float, sample_rate_hz: float) -> int:
     steps = 1.0 / (step_s * sample_rate_hz)
-    if round(steps) < 1 or abs(steps - round(steps)) > UNNOTICED * steps:
+    if round(steps) < 1 or abs(steps - round(steps)) > _TIE * steps:
         raise ModelError(
             f"MuJoCo model: its step of {step_s:g} s doesn't divide the log's sample interval of "
             f"{1 / sample_rate_hz:g} s; set <option timestep> to the interval over a whole number"
@@ -261,7 +262,7 @@ def _run(
     joint_laws: Mapping[str, JointLaw],
 ) -> SimulatorResponse:
     # numba takes a moment to import, and who only describes a model needs none.
-    from chladni.gap.simulators.mujoco_kernel import Laws, Record, Simulated, run
+    from chladni.models.simulators.mujoco_kernel import Laws, Record, Simulated, run
 
     step_s = float(model.opt.timestep)
     rows = np.array([index(model, "actuator", each.name) for each in simulator.inputs], dtype=np.int64)
