@@ -16,27 +16,15 @@ from chladni.gap.records.measurement import Measurement
 from chladni.models.core.compiled_model import CompiledModel
 from chladni.models.core.model import Model
 from chladni.models.core.port_law import PortLaw
-from chladni.models.core.simulation import PortMotion
+from chladni.models.simulators.simulator import SimulatorResponse
 from chladni.signals.arrays import Complex, Real
-
-
-class Response(Protocol):
-    """What a run gives: ``outputs [output, sample]``, and the motion at each joint."""
-
-    @property
-    def outputs(self) -> Real:
-        """As sensors record them, SI."""
-
-    @property
-    def motions(self) -> tuple[PortMotion, ...]:
-        """One for each joint of the plant, in its order."""
 
 
 @runtime_checkable
 class BlackBox(Model, Protocol):
     """A plant without known equations; `compile` gives its terminals and joints, with nothing in between."""
 
-    def respond(self, inputs: Real, sample_rate_hz: float) -> Response:
+    def respond(self, inputs: Real, sample_rate_hz: float) -> SimulatorResponse:
         """Run from its own start under ``inputs [input, sample]``; `ModelError` when it diverges."""
 
     def refined(self) -> Self | None:

@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from chladni.gap.calibration import KEPT, PARTS, UNNOTICED
-from chladni.gap.plant.black_box import BlackBox, Response
+from chladni.gap.plant.black_box import BlackBox
 from chladni.gap.plant.kept import Kept
 from chladni.gap.plant.laid_inputs import LaidInputs
 from chladni.gap.plant.linear_run import is_plain, linear_outputs
@@ -21,6 +21,7 @@ from chladni.models.integrator.hold import hold_of
 from chladni.models.integrator.input_rows import input_rows
 from chladni.models.integrator.integrator import Integration, Integrator
 from chladni.models.integrator.trapezoid_march import Equations, Marched, equations, run_laws
+from chladni.models.simulators.simulator import SimulatorResponse
 from chladni.signals.arrays import Real, Whole
 from chladni.signals.errors import ModelError
 
@@ -79,7 +80,7 @@ class FreeRun:
         finer = self.model.refined() if isinstance(self.model, BlackBox) else None
         return None if finer is None else FreeRun(finer, self.measurement)
 
-    def _responded(self, box: BlackBox, z: Real | None, effects: Sequence[Effect]) -> Response:
+    def _responded(self, box: BlackBox, z: Real | None, effects: Sequence[Effect]) -> SimulatorResponse:
         return _at(box, self.tunables, z, effects).respond(self.measurement.inputs, self.measurement.sample_rate_hz)
 
     def outputs(
