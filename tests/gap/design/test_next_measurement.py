@@ -60,7 +60,7 @@ def test_measuring_as_advised_tells_hardening_from_a_stiffer_spring(hardening_or
     assert again[0].log_evidence - again[1].log_evidence > apart + 20
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_is_expected_of_the_log_is_what_the_contest_found():
     arguments = contested(COULOMB, acting("coulomb_friction", "j1", force=0.3), wrong("j1.damping"))
     candidates = arguments[3]
