@@ -129,6 +129,7 @@ def test_a_load_and_a_late_sensor_are_named_together_and_pass_for_no_hold(output
     assert search.study.model.compile().holds == arm().compile().holds
 
 
+@pytest.mark.nightly
 def test_each_word_that_leads_is_tried_at_all_parts_of_its_kind(monkeypatch: pytest.MonkeyPatch) -> None:
     # At two of three joints friction and hysteresis are close, whichever acts at all of them; both lead at the same
     # sites. A word for each of two joints is a worse guess than either.
