@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from chladni.apps.documents import Document
-from chladni.apps.sources import Span
 from chladni.io.log import Log
 from chladni.robots.joint_log import joint_log
 from chladni.robots.joint_topics import choose
@@ -62,17 +61,13 @@ class SimulatedRobot:
     remarks: tuple[str, ...]
 
 
-def simulate_robot(
-    robot: Robot, log: Log, *, state: str | None = None, command: str | None = None, span: Span | None = None
-) -> SimulatedRobot:
+def simulate_robot(robot: Robot, log: Log, *, state: str | None = None, command: str | None = None) -> SimulatedRobot:
     """Run a robot as described: freely where its drives hold positions, else anew every period of the cutoff.
 
     Parameters
     ----------
     state, command
         Topics of the joints; chosen where they aren't given.
-    span
-        Which part of the log.
 
     Raises
     ------
@@ -85,8 +80,7 @@ def simulate_robot(
     from chladni.gap.robots.trial import runs_of
     from chladni.robots.machine import as_described
 
-    start_s, end_s = (None, None) if span is None else (span.start_s, span.end_s)
-    read = joint_log(robot, log, state=state, command=command, start_s=start_s, end_s=end_s)
+    read = joint_log(robot, log, state=state, command=command)
     torques = torques_of(robot, read)
     unknown = [name for name, driven in zip(read.joints, torques.driven, strict=True) if not driven]
     if unknown:
@@ -105,7 +99,7 @@ def simulate_robot(
             f"runs go astray in {percent(float(astray.mean()))} of the log, where nothing is given back: what "
             "drives it there doesn't hold this robot"
         )
-    places = choose(robot, log, state=state, command=command, span_s=(start_s, end_s)).state
+    places = choose(robot, log, state=state, command=command).state
     paths = places.paths(places.fields()["position"], read.joints)
     units = ["rad" if joint.kind == "hinge" else "m" for joint in torques.joints]
     rows = np.rint(read.time_s * read.sample_rate_hz).astype(np.intp)

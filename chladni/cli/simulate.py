@@ -18,6 +18,7 @@ from chladni.signals.wording import counted
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from chladni.apps.documents import Document
     from chladni.apps.simulated_log import SimulatedLog
     from chladni.apps.simulated_robot import JointError
     from chladni.io.mcap.writer import WrittenLog
@@ -110,7 +111,7 @@ def simulate(
     json: options.Json = None,
 ) -> None:
     """Simulate a model and write a log, with its truth beside it; or a robot, by a log's commands."""
-    from chladni.apps.model_sources import named_instrument, recording_for
+    from chladni.apps.model_sources import named_instrument
     from chladni.apps.simulated_log import Drive, require_log_place, simulate_log, write_simulated_log
 
     to = Output(json)
@@ -120,22 +121,20 @@ def simulate(
         reads=[Path(model), log, opener.setup],
         writes={"--out": out, "the truth of --out": out.with_suffix(".truth.json"), "--json": json},
     )
+    drive_options = {"--input": None if kind == "random" else kind, "--at": at, "--level": level, "--band": band,
+                     "--seconds": seconds}  # fmt: skip
     if _is_robot(model):
-        _refuse({"--input": None if kind == "random" else kind, "--at": at, "--level": level, "--band": band,
-                 "--seconds": seconds, "--noise": noise or None, "--set": settings, "--effect": effect})  # fmt: skip
+        others = {"--rate": rate, "--noise": noise or None, "--set": settings, "--effect": effect}
+        _refuse({**drive_options, **others}, "for a robot: it runs as described, by the log's commands")
         _simulate_robot(to, Path(model), log, out, opener, state=state, command=command)
         return
     if state is not None or command is not None:
         raise SetupError(f"--state and --command name topics of a robot's joints, and {model!r} is none")
     instrument = named_instrument(model)
     chosen = _changed(instrument.model(), settings or (), effect or ())
-    recording = None
-    damage: tuple[str, ...] = ()
     if log is not None:
-        _refuse({"--input": None if kind == "random" else kind, "--at": at, "--level": level, "--band": band,
-                 "--seconds": seconds})  # fmt: skip
-        with opener(log) as opened:
-            recording, damage = recording_for(chosen, opened)
+        _refuse(drive_options, "with --log: the log's own signals drive the model")
+    recording, damage = (None, ()) if log is None else _recording(chosen, log, opener)
     drive = Drive(
         word=kind,
         level=_usual_level(instrument, at) if level is None else level,
@@ -150,9 +149,14 @@ def simulate(
     to.lines((*damage, *made.simulation.flags))
     to.line(f"wrote {written.path}")
     to.line(f"wrote {truth}")
-    nrmse = {score.name.removeprefix("NRMSE "): score.value for score in made.agreement}
-    to.json(lambda: {**made.truth, "format": "chladni.simulate/1", "log": str(written.path), "truth_file": str(truth),
-             "nrmse_percent": nrmse})  # fmt: skip
+    to.json(lambda: _document(made, written, truth))
+
+
+def _recording(model: "Model", log: Path, opener: Opener) -> "tuple[TimeSeries, tuple[str, ...]]":
+    from chladni.apps.model_sources import recording_for
+
+    with opener(log) as opened:
+        return recording_for(model, opened)
 
 
 def _is_robot(name: str) -> bool:
@@ -217,6 +221,12 @@ def _print(to: Output, name: str, made: "SimulatedLog", written: "WrittenLog") -
         to.line(f"{score.name}: {told} ({score.definition})")
 
 
+def _document(made: "SimulatedLog", written: "WrittenLog", truth: Path) -> "Document":
+    nrmse = {score.name.removeprefix("NRMSE "): score.value for score in made.agreement}
+    return {**made.truth, "format": "chladni.simulate/1", "log": str(written.path), "truth_file": str(truth),
+            "nrmse_percent": nrmse}  # fmt: skip
+
+
 def _usual_level(instrument: "Instrument", at: str | None) -> float:
     """What is a step on the bench is a sensible size for any excitation of that input; of others nothing is known."""
     return instrument.step_size if at in (None, instrument.step_input) else 1.0
@@ -232,8 +242,8 @@ def _rows(series: "TimeSeries", names: "Mapping[str, str]") -> list[list[str]]:
     ]
 
 
-def _refuse(given: dict[str, object]) -> None:
-    """Raise `SetupError` for what a log that drives the model decides itself."""
+def _refuse(given: "Mapping[str, object]", why: str) -> None:
+    """Raise `SetupError` for the first option that was given though it can't do anything."""
     for name, value in given.items():
         if value is not None:
-            raise SetupError(f"{name} has no meaning with --log: the log's own signals drive the model")
+            raise SetupError(f"{name} has no meaning {why}")

@@ -70,9 +70,11 @@ def test_what_has_no_meaning_for_a_robot_is_refused(run: Run, tmp_path: Path) ->
     right = made(tmp_path)
     out = ("--out", tmp_path / "sim.mcap")
     assert "give one with --log" in run("simulate", right.description, *out).err
-    refused = run("simulate", right.description, "--log", right.log, "--seconds", "3", *out)
-    assert refused.code == 2
-    assert "--seconds has no meaning with --log" in refused.err
+    for option, value in (("--seconds", "3"), ("--rate", "500"), ("--noise", "0.1"), ("--set", "elbow.damping=2")):
+        refused = run("simulate", right.description, "--log", right.log, option, value, *out)
+        assert refused.code == 2
+        assert f"{option} has no meaning for a robot" in refused.err
+        assert not (tmp_path / "sim.mcap").exists()
     model = run("simulate", "structure", "--state", "/joint_states", *out)
     assert "--state and --command name topics of a robot's joints" in model.err
 

@@ -77,7 +77,11 @@ class Belief:
     def nats(self, one: Contestant) -> float:
         """Evidence and prior of one fit."""
         prior = self.value * len(one.hypothesis.freed) + self._words(one.hypothesis.effects)
-        return one.log_evidence - one.left.log_likelihood + one.left.at(self.level).log_likelihood + prior
+        return self.evidence(one) + prior
+
+    def evidence(self, one: Contestant) -> float:
+        """Evidence of one fit where the noise has the level that is believed, not that of the floor."""
+        return one.log_evidence - one.left.log_likelihood + one.left.at(self.level).log_likelihood
 
     @cached_property
     def level(self) -> Real:

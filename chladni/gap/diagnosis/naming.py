@@ -67,7 +67,7 @@ def ranking_of(causes: Causes, causes_said: Sequence[Cause]) -> tuple[Ranked, ..
                 site=key[1],
                 probability=own if candidate in causes.best.hypothesis.named else said.get(key, own),
                 gap=one.gap,
-                log_evidence=one.log_evidence,
+                log_evidence=causes.belief.evidence(one),
                 beside=tuple(other for other in one.hypothesis.named if other != candidate),
             )
     return tuple(sorted(rows.values(), key=lambda row: -row.probability))

@@ -100,7 +100,7 @@ class Cause:
 class Ranked:
     """A row of the ranking; `gap` and `log_evidence` (nats) on held-out samples, None when it wasn't fitted.
 
-    Both are of its best form, with those that it stood `beside` there.
+    Both are of its best form, with those that it stood `beside` there; the evidence at the noise that is believed.
     """
 
     effect: str

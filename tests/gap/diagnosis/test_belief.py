@@ -279,6 +279,14 @@ def test_an_unknown_force_pays_for_each_place_and_for_its_numbers_there(chi: flo
     )
 
 
+def test_evidence_is_told_at_the_noise_that_is_believed() -> None:
+    # Both fits leave less than a floor that is too high: by that alone neither would be worse.
+    close, far = (contestant(left=leaving(share)) for share in (0.4, 0.9))
+    belief = Belief(location([place(1.0)], misfit=100.0), [close, far])
+    assert close.left.log_likelihood == far.left.log_likelihood == 0.0
+    assert belief.evidence(close) > belief.evidence(far) + 10.0
+
+
 def test_where_a_sensor_is_told_to_err_nothing_unknown_acts() -> None:
     where, left = location([place(1.0)], misfit=100.0), leaving(100.0)
     fit = contestant(left=left, log_evidence=left.log_likelihood)
